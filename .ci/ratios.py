@@ -2,8 +2,9 @@
 """Fails when a fast way is not as many times faster than its naive implementation as .ci/ratios.txt asks.
 
 Reads what criterion measured in the same run, so that the speed of the machine does not matter.
-Usage: ratios.py CRITERION_DIR RATIOS_FILE
-       ratios.py --select RATIOS_FILE       which benchmarks to run for that
+Usage: ratios.py CRITERION_DIR RATIOS_FILE [NAME]
+       ratios.py --select RATIOS_FILE [NAME]       which benchmarks to run for that
+NAME selects the pairs of which a name contains it.
 """
 
 import json
@@ -22,26 +23,30 @@ def medians(folder):
     return found
 
 
-def pairs(path):
+def pairs(path, wanted):
     """What the file asks: names of the fast and the naive way, and how many times faster the one must be."""
     for line in Path(path).read_text().splitlines():
         line = line.split("#")[0].strip()
         if line:
             fast, naive, floor = (part.strip() for part in line.split("|"))
-            yield fast, naive, float(floor)
+            if wanted in fast or wanted in naive:
+                yield fast, naive, float(floor)
 
 
-def selection(path):
+def selection(path, wanted):
     """A regular expression for exactly the benchmarks that the file names."""
-    names = {re.escape(name) for fast, naive, _ in pairs(path) for name in (fast, naive)}
+    selected = list(pairs(path, wanted))
+    if not selected:
+        sys.exit(f"no pair of {path} has a name that contains `{wanted}`")
+    names = {re.escape(name) for fast, naive, _ in selected for name in (fast, naive)}
     return f"^({'|'.join(sorted(names))})$"
 
 
-def holds(folder, path):
+def holds(folder, path, wanted):
     """Whether every pair of the file holds in what was measured."""
     measured = medians(Path(folder))
     good = True
-    for fast, naive, floor in pairs(path):
+    for fast, naive, floor in pairs(path, wanted):
         missing = [name for name in (fast, naive) if name not in measured]
         if missing:
             print(f"FAIL  no such benchmark: {', '.join(missing)}; measured: {', '.join(sorted(measured))}")
@@ -55,7 +60,8 @@ def holds(folder, path):
 
 
 if __name__ == "__main__":
+    wanted = sys.argv[3] if len(sys.argv) > 3 else ""
     if sys.argv[1] == "--select":
-        print(selection(sys.argv[2]))
+        print(selection(sys.argv[2], wanted))
     else:
-        sys.exit(not holds(sys.argv[1], sys.argv[2]))
+        sys.exit(not holds(sys.argv[1], sys.argv[2], wanted))

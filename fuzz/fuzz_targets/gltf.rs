@@ -5,7 +5,7 @@ use bansho_base::{
     geometry::mesh::{MAX_TRIANGLES, Mesh},
     host::assets::AssetProblem,
 };
-use bansho_media::assets::{gltf::decode_mesh, limits::MemoryLimit};
+use bansho_media::{gltf::decode_mesh, limits::MemoryLimit};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     // A file beside it is itself, or is missing.

@@ -1,7 +1,7 @@
 //! Drawings as SVG: any text is refused, or is strokes whose every point is finite.
 #![no_main]
 
-use bansho_media::assets::svg::decode_drawing;
+use bansho_media::svg::decode_drawing;
 
 libfuzzer_sys::fuzz_target!(|text: &[u8]| {
     if let Ok(drawing) = decode_drawing(text) {

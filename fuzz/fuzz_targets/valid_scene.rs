@@ -3,7 +3,7 @@
 
 use bansho_base::{host::assets::MemoryAssets, parameters::{self, Table}};
 use bansho::KINDS;
-use bansho_scene::{Scene, SHARED_TABLES};
+use bansho_scene::Scene;
 use bansho_fuzz::{draw_small, one_thread};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
@@ -11,12 +11,8 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let mut pairs = bytes.chunks_exact(2);
     let mut uniform = || pairs.next().map_or(0.75, |pair| f64::from(u16::from_le_bytes([pair[0], pair[1]])) / 65536.0);
     let mut text = String::from("bansho = 2\n");
-    for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
-        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
-        text += &table_text(&header, &parameters::sample((shared.table)(), &mut uniform));
-    }
-    for kind in KINDS {
-        text += &table_text(&format!("[[{}]]", kind.key), &parameters::sample((kind.table)(), &mut uniform));
+    for kind in KINDS.iter().filter(|kind| kind.key != "plate") {
+        text += &table_text(&kind.header(), &parameters::sample((kind.table)(), &mut uniform));
     }
     // Values that do not go together, such as A + D above 1, are refused; each alone is valid.
     if let Ok(scene) = Scene::parse("fuzz.toml", &text, KINDS) {

@@ -15,7 +15,10 @@ use bansho_base::{
         observer::Observer,
     },
 };
-use bansho_media::assets::{decode_depth, decode_picture, limits};
+use bansho_media::{
+    assets::{decode_depth, decode_picture},
+    limits,
+};
 use bansho_render::{
     CompiledScene, Plan, PlanOptions, RenderError, Shot,
     display::{BitDepth, display},

@@ -47,12 +47,12 @@ fn tables(criterion: &mut Criterion) {
     group.finish();
 }
 
-fn falls(criterion: &mut Criterion) {
+fn tracks(criterion: &mut Criterion) {
     let table = Emission::new(atmosphere(), ARC);
-    let falls = TrackSampler::new(table.deposition(), 0.002);
+    let sampler = TrackSampler::new(table.deposition(), 0.002);
     let key = Key::new(1, "aurora");
     let node = energy_grid::locate(10_001.0).0;
-    let library = TrackLibrary::new(&falls, node..=node, key);
+    let library = TrackLibrary::new(&sampler, node..=node, key);
     let mut group = criterion.benchmark_group("aurora falls of 1000 particles, 10 keV");
     group.sample_size(10);
     group.bench_function("library", |bencher| {
@@ -67,12 +67,12 @@ fn falls(criterion: &mut Criterion) {
         bencher.iter(|| {
             let particles = 0..PARTICLES;
             particles
-                .flat_map(|particle| falls.sample_track(node, key, particle))
+                .flat_map(|particle| sampler.sample_track(node, key, particle))
                 .fold(0.0, |sum, collision| sum + collision.altitude_km + collision.transverse_km[0])
         });
     });
     group.finish();
 }
 
-criterion_group!(benches, tables, falls);
+criterion_group!(benches, tables, tracks);
 criterion_main!(benches);

@@ -70,7 +70,8 @@ pub mod simulate;
 
 pub use model::Aurora;
 pub use parameters::{
-    AuroraParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters, NeighborSearch, ParticleParameters,
-    PowerDistribution, PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel, SpectrumShape, Stage,
+    AuroraParameters, AuroraStage, FieldCharge, FieldParameters, FieldSolver, FoldParameters, NeighborSearch,
+    ParticleParameters, PowerDistribution, PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel,
+    SpectrumShape,
 };
 pub use render::{Blur, BlurParameters, RenderingParameters, Sampling, TrackModel};

@@ -12,7 +12,7 @@ use bansho_base::{
 use super::{
     AuroraParameters,
     parameters::{check_color_matching, check_energies},
-    render::Sampling,
+    render::{RenderingParameters, Sampling},
     shapes::{Sequence, ShapeError, ShapeErrorKind},
     simulate::{AuroraSimulation, check_neighbors},
 };
@@ -183,8 +183,19 @@ impl Aurora {
         &self.run_state().red_profiles
     }
 
-    pub(super) fn emitter_colors(&self) -> &EmitterColors {
+    pub(super) fn emitter_colors(&self) -> &Arc<EmitterColors> {
         &self.run_state().emitter_colors
+    }
+
+    /// The colors through the air that is left above an observer at an altitude.
+    pub(super) fn emitter_colors_above(&self, altitude_km: f64) -> Arc<EmitterColors> {
+        let rendering = &self.parameters.rendering;
+        let extinction = rendering.extinction.above(altitude_km);
+        if extinction == rendering.extinction {
+            return self.emitter_colors().clone();
+        }
+        let rendering = RenderingParameters { extinction, ..rendering.clone() };
+        Arc::new(EmitterColors::new(&rendering, self.simulation().emission().lines()))
     }
 
     /// The renderer of single collisions, if the scene selects them.

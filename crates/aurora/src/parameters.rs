@@ -239,7 +239,7 @@ bansho_base::parameters! {
 bansho_base::choice! {
     /// What is drawn: the light, or a stage of its computation as a map of the drawn square in front of everything. Maps show the square seen along the
     /// field, east to the right and north up, as wide as the picture is high; `exposure_ev100 = 9.7` shows their white as white.
-    pub enum Stage {
+    pub enum AuroraStage {
         /// The aurora.
         Light = "light",
         /// Control points and segments of the in-between shape (thesis, figures 2.9, 2.15, 3.4 to 3.8).
@@ -300,7 +300,7 @@ bansho_base::parameters! {
         /// Rendering of the light.
         rendering: RenderingParameters = RenderingParameters::default();
         /// What is drawn: the light, or a map of a stage of its computation.
-        stage: Stage = Stage::Light;
+        stage: AuroraStage = AuroraStage::Light;
     }
 }
 

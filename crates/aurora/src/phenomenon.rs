@@ -7,16 +7,15 @@ use bansho_base::{
     host::observer::{Cancelled, Observer},
     parameters::BuildError,
     phenomenon::{
-        Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
-        editor_hints::{DraftLimit, EditorHints},
-        kind::{BuildContext, Describe},
+        Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SharedMemory, SnapshotError, Stepped, Stepping,
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
     },
+    tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
 use super::{
-    AuroraParameters, Stage,
+    AuroraParameters, AuroraStage,
     model::{Aurora, OBLIQUE_LUMINANCE_FACTOR},
     render::aovs::AOVS,
     shapes::ShapeErrorKind,
@@ -31,26 +30,34 @@ use crate::{
     simulate::point_cloud::point_cloud,
 };
 
-impl Describe for AuroraParameters {
-    const KEY: &'static str = "aurora";
-    const PLACEMENT_KEYS: &'static [&'static str] = &["shapes", "extent_km"];
-    const FIRST_KEYS: &'static [&'static str] = &[
-        "flux_mw_per_m2",
-        "energy_ev",
-        "dip_deg",
-        "time_lapse",
-        "particles.count",
-        "rays.contrast",
-        "folds.amplitude_km",
-    ];
-    const EDITOR_HINTS: EditorHints =
-        EditorHints { draft_limits: &[DraftLimit { key: "particles.count", max: 24_000 }], ..EditorHints::NONE };
-    const IN_THE_SKY: bool = true;
-    // View from the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky is darker than the curtains.
-    const SCENE_DEFAULTS: &'static str = "\
+impl AuroraParameters {
+    /// The table `[[aurora]]`.
+    pub const KIND: TableKind = TableKind {
+        built_bytes: 75e3,
+        placement_keys: &["shapes", "extent_km"],
+        first_keys: &[
+            "flux_mw_per_m2",
+            "energy_ev",
+            "dip_deg",
+            "time_lapse",
+            "particles.count",
+            "rays.contrast",
+            "folds.amplitude_km",
+        ],
+        in_the_sky: true,
+        // View from the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky is darker than the curtains.
+        scene_defaults: "\
         picture = { exposure_ev100 = -6.9, white_balance_k = 4000.0 }\n\
         camera = { position = [0.0, 1.7, 0.0], target = [0.0, 32.0, -57.0], vertical_fov_deg = 62.0 }\n\
-        sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1, night = { airglow = 0.3, stars = 0.6, milky_way = 0.5 } }\n";
+        sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1, night = { airglow = 0.3, stars = 0.6, milky_way = 0.5 } }\n",
+        ..TableKind::phenomenon::<Self>("aurora")
+    };
+}
+
+impl PhenomenonTable for AuroraParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match Aurora::new(self.clone(), context.name, context.seed, context.loop_s, context.assets) {
@@ -71,12 +78,19 @@ impl Phenomenon for Aurora {
     }
 
     fn memory_bytes(&self, pixels: f64) -> f64 {
-        // Measured: tables, the state and the sources of each particle, and the chart, which has up to a cell of 16 bytes for each pixel of the sky.
-        4e7 + 480.0 * self.parameters.particles.count as f64 + 8.0 * pixels
+        // Measured: the fields, the state and the sources of each particle, and the chart, which has up to a cell of 16 bytes for each pixel of the sky.
+        1.4e7 + 500.0 * self.parameters.particles.count as f64 + 8.0 * pixels
+    }
+
+    fn shared_memory(&self, _view: &View) -> Vec<SharedMemory> {
+        // Measured: the tables of emission and of the spread of electrons.
+        let rendering = &self.parameters.rendering;
+        let key = (rendering.energy_deposition as u64) << 8 | self.parameters.spectrum as u64;
+        vec![SharedMemory { key: ("emission tables of auroras", key), bytes: 1e7 }]
     }
 
     fn luminance(&self) -> f64 {
-        if self.parameters.stage == Stage::Light {
+        if self.parameters.stage == AuroraStage::Light {
             OBLIQUE_LUMINANCE_FACTOR * self.max_column_luminance
         } else {
             WHITE_LUMINANCE
@@ -101,14 +115,14 @@ impl Phenomenon for Aurora {
 
 impl Run for Aurora {
     fn publish(&self, _shutter: Shutter) -> Publication {
-        if self.parameters.stage != Stage::Light {
+        if self.parameters.stage != AuroraStage::Light {
             return Publication::default();
         }
         Publication { lights: self.directional_light().into_iter().collect(), ..Publication::default() }
     }
 
     fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        vec![if self.parameters.stage == Stage::Light { DEPTHS } else { stages::DEPTHS }]
+        vec![if self.parameters.stage == AuroraStage::Light { DEPTHS } else { stages::DEPTHS }]
     }
 
     fn prepare<'a>(
@@ -118,7 +132,7 @@ impl Run for Aurora {
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         match self.parameters.stage {
-            Stage::Light => Ok(Box::new(PreparedAurora::new(self, view, observer)?)),
+            AuroraStage::Light => Ok(Box::new(PreparedAurora::new(self, view, observer)?)),
             stage => Ok(Box::new(PreparedStage::new(self, stage, view))),
         }
     }
@@ -127,12 +141,12 @@ impl Run for Aurora {
         let t = view.shutter.middle();
         let step = AuroraSimulation::STEP_S;
         if t - self.simulation().time() <= step {
-            return Some(point_cloud(self.simulation().particles(), t - self.simulation().time()));
+            return Some(point_cloud(self.simulation().particles(), t - self.simulation().time(), view.export_origin));
         }
         // Within a long exposure, `t` may be many steps after the state.
         let mut simulation = self.simulation().clone();
         shutter::step_until(&mut simulation, t);
-        Some(point_cloud(simulation.particles(), t - simulation.time()))
+        Some(point_cloud(simulation.particles(), t - simulation.time(), view.export_origin))
     }
 
     fn as_stepped(&self) -> Option<&dyn Stepped> {

@@ -16,10 +16,10 @@ use bansho_base::{
     parameters::BuildError,
     phenomenon::{
         Deflection, Phenomenon, PhenomenonInfo, Prepared, Run,
-        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Publication, Surroundings},
     },
+    tables::{BuildContext, PhenomenonTable, TableKind},
 };
 use bansho_render::{
     CompiledScene, Plan, PlanOptions, Shot,
@@ -42,8 +42,15 @@ bansho_base::parameters! {
     }
 }
 
-impl Describe for PatchParameters {
-    const KEY: &'static str = "patch";
+impl PatchParameters {
+    /// The table `[[patch]]`.
+    pub(crate) const KIND: TableKind = TableKind::phenomenon::<Self>("patch");
+}
+
+impl PhenomenonTable for PatchParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         let angles = || (0..PATCH.width * PATCH.height).map(|index| bent(index % PATCH.width, index / PATCH.width));
@@ -158,7 +165,8 @@ fn plan(text: &str) -> Planned {
     assets.insert_picture("plate.png", Picture::opaque(color, Encoding::DisplaySrgb));
     let assets = Arc::new(assets);
     let text = format!("bansho = 2\n[picture]\nsize = [1920, 1080]\n{text}");
-    let scene = Scene::parse("bench.toml", &text, &[PatchParameters::KIND]).expect("a valid scene");
+    let kinds: Vec<_> = bansho::KINDS.iter().copied().chain([PatchParameters::KIND]).collect();
+    let scene = Scene::parse("bench.toml", &text, &kinds).expect("a valid scene");
     let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets, None).expect("a valid scene"));
     let plan = Arc::new(Plan::new(&compiled, &PlanOptions::default()).expect("a valid plan"));
     Planned { compiled, plan }

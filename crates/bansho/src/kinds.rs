@@ -1,21 +1,34 @@
-//! The kinds of phenomena that scenes may contain, and the features that enable them.
+//! The registry: the kinds of tables that scenes may contain, and the features that enable phenomena.
 
 #[cfg(feature = "aurora")]
 use bansho_aurora::AuroraParameters;
-#[cfg(any(feature = "aurora", feature = "fire", feature = "rain"))]
-use bansho_base::phenomenon::kind::Describe;
 use bansho_base::{
     parameters::{Problem, ProblemKind},
-    phenomenon::kind::PhenomenonKind,
+    tables::{self, TableKind},
+};
+use bansho_environment::{
+    fog::FogParameters, ground::GroundParameters, lamps::LightParameters, sky::SkyParameters,
+    solids::ObstacleParameters,
 };
 #[cfg(feature = "fire")]
 use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetParameters};
 #[cfg(feature = "rain")]
 use bansho_rain::RainParameters;
-use bansho_scene::{Scene, SceneError};
+use bansho_scene::{Scene, SceneError, kinds};
 
-/// All kinds of this build, in the order of the schema and the book.
-pub const KINDS: &[PhenomenonKind] = &[
+/// The registry of this build: all kinds of tables, in the order of the schema and the book. A program that has phenomena of its own passes a longer one
+/// to [`Scene::parse`].
+pub const KINDS: &[TableKind] = &[
+    kinds::PICTURE,
+    kinds::CAMERA,
+    kinds::PLATE,
+    kinds::WIND,
+    kinds::AIR,
+    SkyParameters::KIND,
+    GroundParameters::KIND,
+    LightParameters::KIND,
+    ObstacleParameters::KIND,
+    FogParameters::KIND,
     #[cfg(feature = "fire")]
     FlameSheetParameters::KIND,
     #[cfg(feature = "fire")]
@@ -26,11 +39,16 @@ pub const KINDS: &[PhenomenonKind] = &[
     AuroraParameters::KIND,
 ];
 
-/// All kinds of Bansho, also those that are disabled in this build, each with the feature of this crate that enables it.
+/// The kinds of phenomena of this build.
+pub fn phenomena() -> impl Iterator<Item = &'static TableKind> + Clone {
+    tables::phenomena(KINDS)
+}
+
+/// All kinds of phenomena of Bansho, also those that are disabled in this build, each with the feature of this crate that enables it.
 const FEATURES: [(&str, &str); 4] =
     [("flame_sheet", "fire"), ("flame_particles", "fire"), ("rain", "rain"), ("aurora", "aurora")];
 
-/// Parses and checks a scene with the kinds of phenomena of this build; `file` is its name in messages. [`CompiledScene::build`] then reads the
+/// Parses and checks a scene with the tables of this build; `file` is its name in messages. [`CompiledScene::build`] then reads the
 /// files that it names and builds its phenomena.
 ///
 /// # Errors
@@ -48,7 +66,7 @@ pub fn parse_scene(file: &str, text: &str) -> Result<Scene, SceneError> {
 /// If the problem is an unknown key that is a disabled kind, replaces it by one that names the feature.
 fn name_feature(problem: &mut Problem) {
     let ProblemKind::UnknownKey { key, .. } = &problem.kind else { return };
-    let disabled = FEATURES.into_iter().find(|(kind, _)| kind == key && !KINDS.iter().any(|known| known.key == *kind));
+    let disabled = FEATURES.into_iter().find(|(kind, _)| kind == key && tables::find(KINDS, kind).is_none());
     if let Some((key, feature)) = disabled.filter(|_| problem.path.is_empty()) {
         problem.kind = ProblemKind::FeatureDisabled { key, feature };
     }
@@ -60,7 +78,7 @@ mod tests {
 
     #[test]
     fn every_kind_has_a_feature() {
-        for kind in KINDS {
+        for kind in phenomena() {
             assert!(FEATURES.iter().any(|(key, _)| *key == kind.key), "{}", kind.key);
         }
     }
@@ -69,7 +87,7 @@ mod tests {
     fn a_disabled_kind_names_its_feature() {
         for (key, feature) in FEATURES {
             let result = parse_scene("scene.toml", &format!("bansho = 2\n[[{key}]]\n"));
-            if KINDS.iter().any(|kind| kind.key == key) {
+            if tables::find(KINDS, key).is_some() {
                 assert!(result.is_ok(), "{key}");
             } else {
                 let error = result.err().unwrap().to_string();

@@ -51,7 +51,7 @@
 //! | looked for | found in |
 //! | --- | --- |
 //! | parameters of a phenomenon | [`FlameSheetParameters`], [`FlameParticlesParameters`], [`RainParameters`], [`AuroraParameters`]; their tables in [`fire`], [`rain`], [`aurora`] |
-//! | camera, wind, air, sky, ground, lamps, obstacles | [`CameraParameters`], [`WindParameters`], [`Air`], [`SkyParameters`], [`GroundParameters`], [`LightParameters`], [`ObstacleParameters`] |
+//! | camera, wind, air, sky, ground, lamps, obstacles, fog | [`CameraParameters`], [`WindParameters`], [`Air`], [`SkyParameters`], [`GroundParameters`], [`LightParameters`], [`ObstacleParameters`], [`FogParameters`] |
 //! | values that change over time | [`Animated`] |
 //! | pixels, depth, AOVs | [`Picture`]; for whole frames [`write_rgba16f`] and its kin |
 //! | light for other objects, particles, drops | [`LiveEffect::lights`], [`LiveEffect::particles`] |
@@ -172,10 +172,13 @@ pub use bansho_base::{
     image::{Image, Rect},
     parameters::animated::Animated,
     phenomenon::surroundings::{Emitter, Light, SrgbLight},
-    world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
+    world::{air::Air, wind::WindParameters},
 };
 #[doc(inline)]
-pub use bansho_environment::ground::GroundParameters;
+pub use bansho_environment::{
+    fog::FogParameters, ground::GroundParameters, lamps::LightParameters, sky::SkyParameters,
+    solids::ObstacleParameters,
+};
 #[cfg(feature = "fire")]
 #[doc(inline)]
 pub use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetParameters};
@@ -191,11 +194,11 @@ pub use bansho_render::{
 };
 #[doc(inline)]
 pub use bansho_scene::{
-    LightParameters, LoopError, ParameterProblems, PictureParameters, PlateParameters, Scene, SceneError, SceneOptions,
+    LoopError, ParameterProblems, PictureParameters, PlateParameters, Scene, SceneError, SceneOptions,
 };
 #[doc(inline)]
 pub use effect::{Effect, EffectError, LiveEffect, Picture};
-pub use kinds::{KINDS, parse_scene};
+pub use kinds::{KINDS, parse_scene, phenomena};
 pub use scene_builder::SceneBuilder;
 
 /// Parses a scene and builds its phenomena.

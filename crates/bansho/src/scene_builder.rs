@@ -5,11 +5,13 @@ use std::fmt::Write;
 use bansho_base::{
     camera::CameraParameters,
     parameters::{Entry, Parameters, Table, Value},
-    phenomenon::kind::Describe,
-    world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
+    tables::{PhenomenonTable, SharedTable},
+    world::{air::Air, wind::WindParameters},
 };
-use bansho_environment::ground::GroundParameters;
-use bansho_scene::{FORMAT, LightParameters, ParameterProblems, PictureParameters, PlateParameters, Scene};
+use bansho_environment::{
+    ground::GroundParameters, lamps::LightParameters, sky::SkyParameters, solids::ObstacleParameters,
+};
+use bansho_scene::{FORMAT, ParameterProblems, PictureParameters, PlateParameters, Scene};
 
 use crate::KINDS;
 
@@ -62,34 +64,40 @@ impl SceneBuilder {
         self.table("air", parameters.to_table())
     }
 
+    /// Sets a table that all phenomena share; of a kind of which a scene may have many, adds one.
+    pub fn shared(self, parameters: &impl SharedTable) -> Self {
+        let (kind, table) = (parameters.kind(), parameters.canonical());
+        if kind.is_list() { self.item(kind.key, table) } else { self.table(kind.key, table) }
+    }
+
     /// Sets the sky.
     pub fn sky(self, parameters: &SkyParameters) -> Self {
-        self.table("sky", parameters.to_table())
+        self.shared(parameters)
     }
 
     /// Sets the ground.
     pub fn ground(self, parameters: &GroundParameters) -> Self {
-        self.table("ground", parameters.to_table())
+        self.shared(parameters)
     }
 
     /// Adds a light.
     pub fn light(self, parameters: &LightParameters) -> Self {
-        self.item("light", parameters.to_table())
+        self.shared(parameters)
     }
 
     /// Adds an obstacle.
     pub fn obstacle(self, parameters: &ObstacleParameters) -> Self {
-        self.item("obstacle", parameters.to_table())
+        self.shared(parameters)
     }
 
     /// Adds a phenomenon, such as a flame sheet. Names are unique in a scene.
-    pub fn phenomenon<P: Describe>(self, name: &str, parameters: &P) -> Self {
+    pub fn phenomenon<P: PhenomenonTable + Parameters>(self, name: &str, parameters: &P) -> Self {
         let mut stated = Table::default();
         stated.push("name", Value::Text(name.to_owned()));
         let defaults = P::default().to_table();
         let differs = |entry: &Entry| defaults.get(&entry.key).is_none_or(|default| default.value != entry.node.value);
         stated.entries.extend(parameters.to_table().entries.into_iter().filter(differs));
-        self.item(P::KEY, stated)
+        self.item(parameters.kind().key, stated)
     }
 
     /// The scene as the text of a scene file.
@@ -146,7 +154,8 @@ fn write_table(text: &mut String, header: &str, table: &Value) {
 
 #[cfg(test)]
 mod tests {
-    use bansho_scene::SHARED_TABLES;
+    use bansho_base::tables;
+    use bansho_environment::fog::FogParameters;
 
     use super::*;
 
@@ -167,18 +176,22 @@ mod tests {
             .ground(&ground)
             .light(&LightParameters::default())
             .obstacle(&obstacle)
-            .obstacle(&ObstacleParameters::default());
-        for table in SHARED_TABLES {
-            assert!(builder.to_toml().contains(&format!("[{}]", table.key)), "no table [{}]", table.key);
+            .obstacle(&ObstacleParameters::default())
+            .shared(&FogParameters::default());
+        for kind in tables::shared(KINDS) {
+            assert!(builder.to_toml().contains(&kind.header()), "no table {}", kind.header());
         }
         let scene = builder.build().unwrap();
         let printed = crate::parse_scene("scene", &builder.to_toml()).unwrap();
-        assert_eq!((&printed.picture, &printed.lights), (&scene.picture, &scene.lights));
-        assert_eq!((scene.picture, scene.camera, scene.air), (picture, camera, air));
-        assert_eq!((scene.wind, scene.plate), (WindParameters::default(), PlateParameters::default()));
-        assert_eq!((scene.sky, scene.ground), (Some(SkyParameters::default()), Some(ground)));
-        assert_eq!(scene.lights, [LightParameters::default()]);
-        assert_eq!(scene.obstacles, [obstacle, ObstacleParameters::default()]);
+        let lights = |scene: &Scene| scene.tables.all().cloned().collect::<Vec<LightParameters>>();
+        assert_eq!((&printed.picture, lights(&printed)), (&scene.picture, lights(&scene)));
+        let tables = &scene.tables;
+        assert_eq!((&scene.picture, &scene.camera, &scene.air), (&picture, &camera, &air));
+        assert_eq!((&scene.wind, &scene.plate), (&WindParameters::default(), &PlateParameters::default()));
+        assert_eq!((tables.get(), tables.get()), (Some(&SkyParameters::default()), Some(&ground)));
+        assert_eq!(lights(&scene), [LightParameters::default()]);
+        let obstacles: Vec<&ObstacleParameters> = tables.all().collect();
+        assert_eq!(obstacles, [&obstacle, &ObstacleParameters::default()]);
     }
 
     #[test]

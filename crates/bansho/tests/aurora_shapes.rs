@@ -179,22 +179,22 @@ fn min_interval_density(simulation: &AuroraSimulation, shape: &Shape) -> f64 {
         let last = bins.len() - 1;
         bins[((f64::from(particles.arc_fractions[index]) * (last + 1) as f64) as usize).min(last)] += 1.0;
     }
-    let stretches = counts.iter().zip(&lengths).flat_map(|(counts, length)| {
+    let intervals = counts.iter().zip(&lengths).flat_map(|(counts, length)| {
         let due = living * BINS as f64 * length / (total * counts.len() as f64);
-        counts.windows(BINS).map(move |stretch| stretch.iter().sum::<f64>() / due)
+        counts.windows(BINS).map(move |interval| interval.iter().sum::<f64>() / due)
     });
-    stretches.fold(f64::INFINITY, f64::min)
+    intervals.fold(f64::INFINITY, f64::min)
 }
 
 #[test]
-fn every_stretch_of_the_thesis_scenes_holds_its_share_on_arrival() {
+fn every_interval_of_the_thesis_scenes_has_its_share_of_particles_on_arrival() {
     for scene in 1..=5 {
         let sequence = sequence(scene);
         let mut simulation = simulation(scene);
         for &arrival in &sequence.arrivals()[1..] {
             step_to(&mut simulation, arrival / FRAME_S);
             let least = min_interval_density(&simulation, &sequence.at(simulation.time()));
-            assert!(least >= 0.5, "scene {scene}, {arrival} s: a stretch holds {least} of its share");
+            assert!(least >= 0.5, "scene {scene}, {arrival} s: an interval has {least} of its share");
         }
     }
 }

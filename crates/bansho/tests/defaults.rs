@@ -1,21 +1,21 @@
 //! Defaults that depend on the other values of a scene.
 
-use bansho::KINDS;
+use bansho::{GroundParameters, KINDS, LightParameters, SkyParameters, phenomena};
 use bansho_base::parameters::{Auto, Value};
-use bansho_scene::{ImpliedBackdrop, Scene, SceneOptions};
+use bansho_scene::{Scene, SceneOptions};
 
 fn read(text: &str) -> Scene {
     let text = format!("bansho = 2\n{text}");
     Scene::parse("test.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}"))
 }
 
-const NONE: ImpliedBackdrop = ImpliedBackdrop { sky: false, ground: false, lights: false };
-const NIGHT: ImpliedBackdrop = ImpliedBackdrop { sky: true, ..NONE };
-const DUSK: ImpliedBackdrop = ImpliedBackdrop { sky: true, ground: true, lights: true };
+const NONE: &[&str] = &[];
+const NIGHT: &[&str] = &["sky"];
+const DUSK: &[&str] = &["sky", "ground", "light"];
 
 #[test]
-fn every_setting_is_a_scene() {
-    for kind in KINDS {
+fn the_scene_defaults_of_every_kind_are_a_scene() {
+    for kind in phenomena() {
         let text = format!("bansho = 2\n{}[[{}]]\n", kind.scene_defaults, kind.key);
         let scene = Scene::parse("setting", &text, KINDS).unwrap_or_else(|error| panic!("{}: {error}", kind.key));
         assert_eq!(scene.implied, NONE, "{}: states all of it", kind.key);
@@ -25,7 +25,7 @@ fn every_setting_is_a_scene() {
 }
 
 #[test]
-fn a_scene_of_one_kind_stands_in_its_setting_unless_something_contradicts_it() {
+fn a_scene_of_one_kind_has_its_scene_defaults_unless_something_contradicts_them() {
     for (text, implied, white) in [
         ("[[flame_sheet]]", NONE, None),
         ("[[flame_particles]]", NONE, None),
@@ -47,19 +47,11 @@ fn a_scene_of_one_kind_stands_in_its_setting_unless_something_contradicts_it() {
         ("", NONE, None),
     ] {
         let scene = read(text);
-        assert_eq!((scene.implied, scene.picture.white_balance_k), (implied, white), "{text}");
-        assert_eq!(
-            (scene.sky.is_some(), scene.ground.is_some(), !scene.lights.is_empty()),
-            {
-                let stated = |table: &str| text.contains(table);
-                (
-                    implied.sky || stated("[sky]"),
-                    implied.ground || stated("[ground]"),
-                    implied.lights || stated("[[light]]"),
-                )
-            },
-            "{text}"
-        );
+        assert_eq!((scene.implied.as_slice(), scene.picture.white_balance_k), (implied, white), "{text}");
+        for key in ["sky", "ground", "light"] {
+            let is_expected = implied.contains(&key) || text.contains(&format!("[{key}]"));
+            assert_eq!(scene.tables.iter().any(|table| table.kind.key == key), is_expected, "{key} in {text}");
+        }
     }
 }
 
@@ -83,7 +75,7 @@ fn a_camera_that_is_told_where_to_stand_or_look_is_left_alone() {
     assert!(dome.target.at(0.0)[1] > 50.0, "a dome looks to the zenith");
 }
 
-/// What is drawn elsewhere may be fainter or brighter than what the setting is exposed for.
+/// What is drawn elsewhere may be fainter or brighter than what the exposure of the scene defaults is for.
 #[test]
 fn what_the_scene_places_is_exposed_for_itself() {
     let exposure = |text: &str| read(text).picture.exposure_ev100;
@@ -91,7 +83,7 @@ fn what_the_scene_places_is_exposed_for_itself() {
     assert_eq!(exposure("[[aurora]]\nflux_mw_per_m2 = 3"), Auto::Set(-6.9));
     for text in ["[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]", "[[aurora]]\n[[aurora]]\nextent_km = 200"]
     {
-        assert_eq!((exposure(text), read(text).implied), (Auto::Auto, NIGHT), "{text}");
+        assert_eq!((exposure(text), read(text).implied.as_slice()), (Auto::Auto, NIGHT), "{text}");
     }
 }
 
@@ -99,8 +91,11 @@ fn what_the_scene_places_is_exposed_for_itself() {
 fn a_backdrop_that_nobody_wrote_is_seen_only_where_the_plan_shows_it() {
     let shown = |text: &str, implied_backdrop| {
         let scene = read(text).with_options(&SceneOptions { implied_backdrop, ..SceneOptions::default() }).unwrap();
-        let sky = scene.sky.as_ref().unwrap();
-        (sky.visible, scene.ground.is_some(), scene.lights.iter().any(|light| light.visible), scene.lights.len())
+        let tables = &scene.tables;
+        let lights: Vec<&LightParameters> = tables.all().collect();
+        let sky: &SkyParameters = tables.get().unwrap();
+        let has_ground = tables.get::<GroundParameters>().is_some();
+        (sky.visible, has_ground, lights.iter().any(|light| light.visible), lights.len())
     };
     assert_eq!(shown("[[rain]]", true), (true, true, true, 3));
     assert_eq!(shown("[[rain]]", false), (false, false, false, 3), "it lights all the same");

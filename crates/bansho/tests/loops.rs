@@ -12,11 +12,11 @@ use bansho_base::{
     parameters::{Kind, TableDescriptor, Value},
 };
 use bansho_render::PlanOptions;
-use bansho_scene::{SHARED_TABLES, Scene, SceneOptions, SharedTable};
+use bansho_scene::{Scene, SceneOptions};
 
 use support::*;
 
-/// A shaken lamp that travels while a turn of one second, 24 frames, passes; all of it is dissolve.
+/// A shaken lamp that travels during a loop of one second, 24 frames, all of which are in the crossfade.
 const TRAVELER: &str =
     "[[emitter]]\nposition = [-1.6, 0, -2]\nvelocity = [1.6, 0, 0]\nshake = 3\nradius = 0.4\npreroll_s = 0.1\n";
 
@@ -110,16 +110,13 @@ fn required_keys(text: &str) -> &'static str {
 
 #[test]
 fn whatever_is_keyed_must_end_a_loop_as_it_begins() {
-    let header =
-        |table: &SharedTable| if table.is_list { format!("[[{}]]", table.key) } else { format!("[{}]", table.key) };
-    let shared = SHARED_TABLES.iter().map(|table| (header(table), (table.table)()));
-    let kinds = KINDS.iter().map(|kind| (format!("[[{}]]", kind.key), (kind.table)()));
     let plan = |text: &str| -> Result<Planned, String> {
         let scene = Scene::parse("loop", text, KINDS).map_err(|error| error.to_string())?;
         Planned::of(scene, (&turn(), &PlanOptions::default()), Arc::new(MemoryAssets::default()))
     };
     let mut tried = 0;
-    for (header, table) in shared.chain(kinds) {
+    for kind in KINDS {
+        let (header, table) = (kind.header(), (kind.table)());
         for (open, closed) in keyed(table, false).iter().zip(keyed(table, true)) {
             let [open, closed] = [open.as_str(), closed.as_str()].map(|text| {
                 format!("bansho = 2\n[picture]\nsize = [16, 9]\n{header}\n{text}\n{}", required_keys(text))
@@ -137,7 +134,7 @@ fn whatever_is_keyed_must_end_a_loop_as_it_begins() {
 }
 
 #[test]
-fn what_is_stepped_dissolves_into_its_next_run_without_a_jump() {
+fn what_is_stepped_crossfades_into_its_next_run_without_a_jump() {
     let film = frames(&looped(TRAVELER), 0..24);
     for (number, frame) in film.iter().enumerate() {
         assert!((light(frame) / light(&film[12]) - 1.0).abs() < 0.03, "the light of frame {number} is kept");
@@ -155,7 +152,7 @@ fn what_is_stepped_dissolves_into_its_next_run_without_a_jump() {
 }
 
 #[test]
-fn frames_of_a_loop_alone_from_snapshots_or_of_a_later_turn_are_those_of_the_whole() {
+fn frames_of_a_loop_alone_from_snapshots_or_of_a_later_period_are_those_of_the_whole() {
     let looped = looped(TRAVELER);
     let film = frames(&looped, 0..24);
     for number in [0, 2, 11, 13, 22] {
@@ -169,5 +166,5 @@ fn frames_of_a_loop_alone_from_snapshots_or_of_a_later_turn_are_those_of_the_who
     }
     let mut shot = looped.open();
     assert_eq!(draw(&mut shot, 23), film[23]);
-    assert_eq!(draw(&mut shot, 24 + 3).beauty, film[3].beauty, "the turn begins again");
+    assert_eq!(draw(&mut shot, 24 + 3).beauty, film[3].beauty, "the loop begins again");
 }

@@ -8,8 +8,9 @@ use std::{path::Path, sync::Arc};
 use bansho::{
     BitDepth, Plan, PlanOptions,
     media::{
-        assets::{decode_picture, limits::MemoryLimit},
+        assets::decode_picture,
         exr,
+        limits::MemoryLimit,
         png::{self, PngEffort},
     },
 };
@@ -20,9 +21,7 @@ use bansho_base::{
     image::Image,
 };
 use bansho_render::{display::display, remarks};
-use support::{AbsorberParameters, EmitterParameters, draw, plan_with};
-
-use bansho_base::phenomenon::kind::Describe;
+use support::{draw, plan_with};
 
 const EMPTY: &str = "bansho = 2\n[picture]\nsize = [24, 16]\nframes = 1\n";
 
@@ -102,18 +101,18 @@ fn a_png_that_bansho_wrote_comes_back_to_a_code_in_both_conventions() {
 
 #[test]
 fn straight_alpha_blends_in_the_values_that_the_plate_says() {
-    let veil = |value: f32| Picture {
+    let overlay = |value: f32| Picture {
         alpha: PictureAlpha::Straight(AlphaConvention::Encoded),
         ..Picture::opaque(Image::filled(24, 16, [value, value, value, 0.5]), Encoding::DisplaySrgb)
     };
-    // Over black: encoded 0.5 is linear 0.214. A black veil of half in encoded values is one of 0.762 in light.
+    // Over black: encoded 0.5 is linear 0.214. A black overlay with alpha 0.5 in encoded values has alpha 0.762 in light.
     for (plate, value, light, coverage) in [
         ("", 1.0, 0.214, 0.0),
         ("", 0.0, 0.0, 0.762),
         ("alpha = \"encoded\"\n", 0.0, 0.0, 0.762),
         ("alpha = \"linear\"\n", 1.0, 0.5, 0.5),
     ] {
-        let [r, g, b, alpha] = over(veil(value), plate).beauty.at(12, 8);
+        let [r, g, b, alpha] = over(overlay(value), plate).beauty.at(12, 8);
         assert!([r, g, b].iter().all(|value| (value - light).abs() < 1e-3), "{plate}: {r} {g} {b}");
         assert!((alpha - coverage).abs() < 1e-3, "{plate}: {alpha}");
     }
@@ -134,9 +133,9 @@ fn what_was_done_with_a_plate_is_told() {
         "{EMPTY}exposure_ev100 = 3\n[plate]\nimage = \"plate\"\ndepth = \"depth\"\ndepth_kind = \"inverse\"\nalpha = \"linear\"\n\
          depth_known = [[1, 1, 10.0], [23, 1, 1.0], [11, 1, 2.0]]\n"
     );
-    let kinds = [AbsorberParameters::KIND, EmitterParameters::KIND];
-    let compiled =
-        Arc::new(support::compiled("a.toml", &text, &kinds, assets).unwrap_or_else(|error| panic!("{error}")));
+    let compiled = Arc::new(
+        support::compiled("a.toml", &text, &support::kinds(), assets).unwrap_or_else(|error| panic!("{error}")),
+    );
     assert!(!compiled.has_opaque_plate());
     let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
     let told: Vec<String> = remarks::remarks(&compiled, &plan).into_iter().map(|(_, remark)| remark.message).collect();
@@ -177,8 +176,8 @@ fn a_plate_without_alpha_stays_opaque() {
 /// A camera at the origin that looks along -z, with a field of view of 90 degrees.
 const VIEW: &str = "bansho = 2\n[picture]\nsize = [24, 16]\nframes = 1\nexposure_ev100 = 0\n[camera]\nposition = [0, 0, 0]\ntarget = [0, 0, -1]\n\
     vertical_fov_deg = 90\n";
-/// Fog before a plate 3 m away, fog and a lamp behind it.
-const BEFORE_AND_BEHIND: &str = "[[absorber]]\nname = \"mist\"\nnear = 1\nfar = 2\nextinction = [0.5, 0.5, 0.5]\n[[absorber]]\nname = \"fog\"\nnear = 4\nfar = 5\n\
+/// Mist before a plate 3 m away, haze and a lamp behind it.
+const BEFORE_AND_BEHIND: &str = "[[absorber]]\nname = \"mist\"\nnear = 1\nfar = 2\nextinction = [0.5, 0.5, 0.5]\n[[absorber]]\nname = \"haze\"\nnear = 4\nfar = 5\n\
     extinction = [1, 1, 1]\n[[emitter]]\nname = \"lamp\"\nposition = [0, 0, -6]\nradius = 100\nluminance = 100\n";
 const SKY: &str = "[sky]\nkind = \"uniform\"\nluminance = 50\n";
 const COVERAGE: f32 = 0.25;
@@ -202,20 +201,20 @@ fn is_close(found: f32, expected: f32) -> bool {
 fn what_a_depth_hides_is_seen_through_the_transparency_of_the_plate() {
     let frame = covered(BEFORE_AND_BEHIND, [0.05, 0.1, 0.15, COVERAGE], Some(3.0), &PlanOptions::default());
     let scale = bansho_base::color::exposure_scale(0.0) as f32;
-    let [mist, fog] = [-0.5, -1.0].map(|depth| bansho_base::math::exp(depth) as f32);
-    // The plate through the mist; the lamp through mist, three quarters of the plate, and fog.
-    let behind = (1.0 - COVERAGE) * mist * fog * 100.0 * scale;
+    let [mist, haze] = [-0.5, -1.0].map(|depth| bansho_base::math::exp(depth) as f32);
+    // The plate through the mist; the lamp through mist, three quarters of the plate, and haze.
+    let behind = (1.0 - COVERAGE) * mist * haze * 100.0 * scale;
     let expected = [0.05, 0.1, 0.15].map(|color| mist * color + behind);
     for pixel in frame.beauty.pixels() {
         assert!((0..3).all(|c| is_close(pixel[c], expected[c])), "{pixel:?} {expected:?}");
-        assert!(is_close(pixel[3], 1.0 - mist * fog * (1.0 - COVERAGE)), "{pixel:?}");
+        assert!(is_close(pixel[3], 1.0 - mist * haze * (1.0 - COVERAGE)), "{pixel:?}");
     }
     // An opaque plate hides it.
     let opaque = covered(BEFORE_AND_BEHIND, [0.05, 0.1, 0.15, 1.0], Some(3.0), &PlanOptions::default());
     assert!(opaque.beauty.pixels().iter().all(|pixel| is_close(pixel[2], mist * 0.15) && pixel[3] == 1.0));
     // Without a depth, all are before the plate.
     let far = covered(BEFORE_AND_BEHIND, [0.05, 0.1, 0.15, COVERAGE], None, &PlanOptions::default());
-    let in_front = mist * fog * 0.05 + mist * fog * 100.0 * scale;
+    let in_front = mist * haze * 0.05 + mist * haze * 100.0 * scale;
     assert!(far.beauty.pixels().iter().all(|pixel| is_close(pixel[0], in_front)), "{:?}", far.beauty.at(0, 0));
 }
 
@@ -239,7 +238,7 @@ fn the_sky_is_seen_through_the_transparency_of_the_plate() {
         for (c, suffix) in ["R", "G", "B", "A"].iter().enumerate() {
             let layers: Vec<_> =
                 frame.channels.iter().filter(|channel| channel.name.ends_with(&format!(".{suffix}"))).collect();
-            assert_eq!(layers.len(), 5, "mist, fog, lamp, sky and plate");
+            assert_eq!(layers.len(), 5, "mist, haze, lamp, sky and plate");
             let sum: f32 = layers.iter().map(|layer| layer.values[100]).sum();
             assert!(is_close(sum, frame.beauty.pixels()[100][c]), "{suffix}: {sum}");
         }

@@ -5,19 +5,20 @@
 
 use std::{panic, sync::Arc};
 
-use bansho::KINDS;
+use bansho::{FogParameters, KINDS, phenomena};
 use bansho_base::{
     camera::CameraParameters,
     color,
     host::{assets::MemoryAssets, observer::Unobserved},
     math::random::{Key, Purpose, uniform},
     parameters::{Parameters, Reader, Table, Value, sample},
+    tables,
 };
 use bansho_render::{
     CompiledScene, Plan, PlanOptions, Shot,
     display::{BitDepth, display},
 };
-use bansho_scene::{SHARED_TABLES, Scene, SceneOptions};
+use bansho_scene::{Scene, SceneOptions};
 use rayon::prelude::*;
 
 /// Default of `BANSHO_RANDOM_SCENES`, which is larger in `.ci/run` and `.ci/long`.
@@ -109,19 +110,26 @@ fn scene(seed: u64) -> String {
         f64::from(uniform(key.words(drawn, 0, Purpose(0))[0]))
     };
     let mut text = String::from("bansho = 2\n");
-    for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate") {
-        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+    for shared in tables::shared(KINDS).filter(|shared| !["plate", "fog"].contains(&shared.key)) {
         let mut table = sample((shared.table)(), &mut uniform);
         // Random tables name no files, so no obstacle can be a mesh; the size of the picture is fixed.
         let left_out = [("obstacle", "shape"), ("picture", "size")];
         table.entries.retain(|entry| !left_out.contains(&(shared.key, &entry.key)));
         let camera = CameraParameters::read_table(&table, &mut Reader::new(), &[]);
+        // Exposures of seconds are the mean of many parts: most scenes have a usual one.
+        if shared.key == "camera" && !seed.is_multiple_of(16) {
+            for entry in table.entries.iter_mut().filter(|entry| entry.key == "shutter_s") {
+                if let Value::Number(seconds) = &mut entry.node.value {
+                    *seconds *= 0.01;
+                }
+            }
+        }
         if shared.key == "camera" && camera.fov_of_focal_length().is_some_and(|[_, widest]| widest > 170.0) {
             table.entries.retain(|entry| entry.key != "focal_length_mm");
         }
-        text += &lines(&header, &table);
+        text += &lines(&shared.header(), &table);
     }
-    for (index, kind) in KINDS.iter().enumerate() {
+    for (index, kind) in phenomena().enumerate() {
         let mut table = sample((kind.table)(), &mut uniform);
         keep_small(&mut table, kind.key);
         keep_compatible(&mut table, kind.key);
@@ -131,9 +139,13 @@ fn scene(seed: u64) -> String {
             table.entries.retain(|entry| !["shape", "shapes"].contains(&entry.key.as_str()));
         }
         // A scene is refused if one of its phenomena is, so most scenes have only one.
-        if seed.is_multiple_of(8) || seed as usize % KINDS.len() == index {
+        if seed.is_multiple_of(8) || seed as usize % phenomena().count() == index {
             text += &lines(&format!("[[{}]]", kind.key), &table);
         }
+    }
+    // Fog hides much, so most scenes have none.
+    if seed.is_multiple_of(4) {
+        text += &lines("[fog]", &sample(FogParameters::table(), &mut uniform));
     }
     text
 }

@@ -1,8 +1,8 @@
-//! Edits of a scene's text by `--set`, and its upgrade.
+//! Edits of a scene's text by `--set`.
 
 use bansho::{
     KINDS,
-    scene::edit::{self, EditError, upgrade},
+    scene::edit::{self, EditError},
 };
 
 fn set(text: &str, assignment: &str) -> Result<String, EditError> {
@@ -103,13 +103,4 @@ fn a_path_without_its_table_gets_the_tables_that_have_such_a_parameter() {
     assert!(!told(SCENE, "rate_mm_per_h=2").contains("rain"), "there is no rain in that scene");
     assert!(!told(SCENE, "zzzzqqq=2").contains("did you mean"));
     assert!(set(SCENE, "bansho=2").is_ok() && set(SCENE, "wind={ gust = 1 }").is_ok());
-}
-
-#[test]
-fn upgrade_states_the_format_once() {
-    assert_eq!(upgrade(SCENE).unwrap(), None);
-    let upgraded = upgrade("# mine\n[picture]\nframes = 3\n").unwrap().unwrap();
-    assert!(upgraded.starts_with("bansho = 2\n# mine"), "{upgraded}");
-    assert_eq!(upgrade(&upgraded).unwrap(), None);
-    assert_eq!(upgrade("bansho = 99").unwrap_err(), EditError::NewerFormat { found: 99 });
 }

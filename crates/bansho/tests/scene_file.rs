@@ -7,9 +7,10 @@ use bansho_base::{
     host::assets::MemoryAssets,
     math::random::{Key, Purpose, uniform},
     parameters::{self, Kind, Value},
+    tables,
 };
 use bansho_render::PlanOptions;
-use bansho_scene::{SHARED_TABLES, schema, template};
+use bansho_scene::{schema, template};
 
 use support::*;
 
@@ -107,8 +108,8 @@ fn faults_name_their_place_and_what_is_allowed() {
             "bansho = 2\n[[obstacle]]\nshape = \"mesh\"\nfile = \"gone.glb\"\n",
             "test.toml:4:8: obstacle.0.file: gone.glb: no such file",
         ),
-        ("bansho = 3\n", "test.toml:1:10: bansho: format 3 is newer than this program knows; known: up to 2"),
-        ("bansho = 0\n", "`bansho upgrade` rewrites the file"),
+        ("bansho = 3\n", "test.toml:1:10: bansho: format 3 cannot be read by this version; allowed: 2"),
+        ("bansho = 1\n", "test.toml:1:10: bansho: format 1 cannot be read by this version; allowed: 2"),
         ("[picture]\n", "the scene must begin with `bansho = 2`"),
         ("bansho = 2\n[picture\n", "test.toml:2:"),
         ("", "the scene must begin with `bansho = 2`"),
@@ -205,19 +206,22 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
 fn random_scene(seed: u64) -> String {
     let mut uniform = random(seed);
     let mut text = String::from("bansho = 2\n");
-    for shared in SHARED_TABLES.iter().filter(|shared| shared.key != "plate" && shared.key != "picture") {
-        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+    for shared in tables::shared(bansho::KINDS).filter(|shared| !["plate", "picture", "fog"].contains(&shared.key)) {
         let mut table = parameters::sample((shared.table)(), &mut uniform);
         // Random tables name no files, so no obstacle can be a mesh; a spot may not be full beyond its end.
         // Most random lenses are beyond the field of view that they may have.
         let left_out = [("obstacle", "shape"), ("light", "inner_cone_deg"), ("camera", "focal_length_mm")];
         table.entries.retain(|entry| !left_out.contains(&(shared.key, &entry.key)));
-        text += &table_text(&header, &table);
+        text += &table_text(&shared.header(), &table);
     }
-    for kind in kinds() {
+    for kind in phenomena() {
         let mut table = parameters::sample((kind.table)(), &mut uniform);
         table.entries.retain(|entry| !["near", "far", "preroll_s"].contains(&entry.key.as_str()));
         text += &table_text(&format!("[[{}]]", kind.key), &table);
+    }
+    if seed.is_multiple_of(4) {
+        let fog = tables::find(bansho::KINDS, "fog").unwrap();
+        text += &table_text(&fog.header(), &parameters::sample((fog.table)(), &mut uniform));
     }
     text + "[picture]\nsize = [17, 11]\n"
 }
@@ -277,19 +281,16 @@ fn every_default_lies_within_its_own_bounds_and_every_parameter_is_explained() {
             }
         }
     }
-    for shared in &SHARED_TABLES {
-        check(shared.key, (shared.table)());
-    }
-    for kind in kinds().iter().chain(bansho::KINDS) {
+    for kind in phenomena().iter().chain(bansho::KINDS) {
         check(kind.key, (kind.table)());
     }
 }
 
 #[test]
 fn a_commented_template_is_a_valid_scene_also_when_every_line_is_uncommented() {
-    for kind in kinds().iter().chain(bansho::KINDS) {
-        let text = template::commented(kind);
-        let kinds: Vec<_> = kinds().into_iter().chain(bansho::KINDS.iter().copied()).collect();
+    let kinds: Vec<_> = bansho::KINDS.iter().copied().chain(phenomena()).collect();
+    for kind in tables::phenomena(&kinds) {
+        let text = template::commented(kind, &kinds);
         let parse = |text: &str| compiled("new.toml", text, &kinds, MemoryAssets::default()).map(drop);
         parse(&text).unwrap_or_else(|error| panic!("{error}"));
         let uncommented: String = text
@@ -301,18 +302,25 @@ fn a_commented_template_is_a_valid_scene_also_when_every_line_is_uncommented() {
     }
 }
 
+/// The tables that phenomena share, with their paths.
+fn shared_tables(scene: &bansho_scene::Scene) -> Vec<(String, Value)> {
+    let table =
+        |(path, table): (String, &bansho_scene::SharedInstance)| (path, Value::Table(table.parameters.canonical()));
+    scene.tables.with_paths().map(table).collect()
+}
+
 #[test]
-fn a_template_states_all_of_its_kinds_setting() {
-    for kind in bansho::KINDS {
+fn a_template_states_all_scene_defaults_of_its_kind() {
+    for kind in bansho::phenomena() {
         let parse = |text: &str| {
             let kinds = bansho::KINDS;
             let compiled = compiled("new.toml", text, kinds, MemoryAssets::default());
             compiled.unwrap_or_else(|error| panic!("{error}")).scene().clone()
         };
         let stated = parse(&format!("bansho = 2\n{}\n[[{}]]\n", kind.scene_defaults, kind.key));
-        let new = parse(&template::commented(kind));
+        let new = parse(&template::commented(kind, bansho::KINDS));
         assert_eq!((&new.picture, &new.camera, &new.wind), (&stated.picture, &stated.camera, &stated.wind));
-        assert_eq!((&new.sky, &new.ground, &new.lights), (&stated.sky, &stated.ground, &stated.lights));
+        assert_eq!(shared_tables(&new), shared_tables(&stated));
         assert_eq!(new.instances.len(), 1);
     }
 }
@@ -320,15 +328,15 @@ fn a_template_states_all_of_its_kinds_setting() {
 #[test]
 fn a_short_template_says_what_one_changes_first_and_is_the_same_scene() {
     let kinds = bansho::KINDS;
-    for kind in kinds {
+    for kind in bansho::phenomena() {
         let parse = |text: &str| {
             let compiled = compiled("new.toml", text, kinds, MemoryAssets::default());
             compiled.unwrap_or_else(|error| panic!("{error}\n{text}")).scene().clone()
         };
-        let text = template::short(kind);
-        let (short, long) = (parse(&text), parse(&template::commented(kind)));
+        let text = template::short(kind, kinds);
+        let (short, long) = (parse(&text), parse(&template::commented(kind, bansho::KINDS)));
         assert_eq!((&short.picture, &short.camera, &short.wind), (&long.picture, &long.camera, &long.wind));
-        assert_eq!((&short.sky, &short.ground, &short.lights), (&long.sky, &long.ground, &long.lights));
+        assert_eq!(shared_tables(&short), shared_tables(&long));
         assert_eq!((&short.air, &short.plate), (&long.air, &long.plate));
         let count = text.lines().count();
         assert!((15..=40).contains(&count), "{count} lines:\n{text}");
@@ -387,6 +395,14 @@ fn the_schema_knows_every_parameter() {
     assert_eq!(schema["properties"]["camera"]["properties"]["lens"]["enum"][1], "fisheye");
     assert_eq!(schema["properties"]["emitter"]["items"]["properties"]["radius"]["minimum"], 0.0);
     assert!(schema["properties"]["wind"]["properties"]["velocity"]["anyOf"][1]["properties"]["keys"].is_object());
+    // A name has no dots, as the parser says; the parser refuses what the schema lists.
+    let name = &schema["properties"]["emitter"]["items"]["properties"]["name"];
+    assert!(name["pattern"].as_str().unwrap().starts_with("^[^.") && name["maxLength"] == 63, "{name}");
+    let refused: Vec<&str> = name["not"]["enum"].as_array().unwrap().iter().map(|own| own.as_str().unwrap()).collect();
+    assert!(refused.contains(&"plate") && refused.contains(&"RGBA"));
+    for name in refused.into_iter().chain(["left.log", " ", "", "a\\u0007b"]) {
+        assert!(fault(&format!("bansho = 2\n[[emitter]]\nname = \"{name}\"\n")).contains("allowed: "), "{name}");
+    }
 }
 
 #[test]

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use bansho::KINDS;
+use bansho::{KINDS, phenomena};
 use bansho_base::{
     host::assets::MemoryAssets,
     parameters::{Descriptor, Kind, ProblemKind, TableDescriptor, Value},
-    phenomenon::kind::BuildContext,
+    tables::BuildContext,
 };
-use bansho_scene::{FORMAT, SHARED_TABLES, Scene};
+use bansho_scene::{FORMAT, Scene};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/scene.md");
 
@@ -50,7 +50,7 @@ fn every_scene_in_readme_and_book_is_valid() {
 fn the_guide_lists_every_aov() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/guide/output.md");
     let page = std::fs::read_to_string(page).unwrap();
-    for kind in KINDS {
+    for kind in phenomena() {
         let scene = format!("bansho = 2\n[[{}]]\n", kind.key);
         let scene = Scene::parse("aovs", &scene, KINDS).unwrap_or_else(|error| panic!("{error}"));
         let context =
@@ -72,12 +72,9 @@ fn page() -> String {
          A scene begins with its format, `bansho = {FORMAT}`. Everything else may be left out and then has the default given \
          here. How values, keys and curves are written is described in [the guide](../guide/scene-file.md).\n"
     );
-    for shared in &SHARED_TABLES {
-        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
-        section(&mut page, &header, "", (shared.table)());
-    }
     for kind in KINDS {
-        section(&mut page, &format!("[[{}]]", kind.key), COMMON, (kind.table)());
+        let common = if kind.is_phenomenon() { COMMON } else { "" };
+        section(&mut page, &kind.header(), common, (kind.table)());
     }
     page
 }

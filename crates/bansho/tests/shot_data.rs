@@ -93,3 +93,33 @@ fn a_scene_without_particles_or_flames_has_none() {
     dark.advance(0, &Unobserved).unwrap();
     assert!(dark.lights().is_empty());
 }
+
+#[test]
+fn particles_far_from_the_origin_stay_apart() {
+    let at = |x: f64, z: f64| {
+        format!(
+            "bansho = 2\n[picture]\nsize = [64, 36]\n[camera]\nposition = [{x:.1}, 1.6, {:.1}]\ntarget = [{x:.1}, 1.0, {z:.1}]\n\
+             [[flame_particles]]\nposition = [{x:.1}, 0.0, {z:.1}]\nparticles = 400\npreroll_s = 0.5\n[[rain]]\nmethod = \"drops\"\n",
+            z + 4.0
+        )
+    };
+    let [near, far] = [at(0.0, 0.0), at(500_000.0, 400_300.0)].map(|text| {
+        let mut shot = shot(&text);
+        let clouds = [1, 2].map(|number| {
+            shot.advance(number, &Unobserved).unwrap();
+            shot.point_clouds().into_iter().map(|(_, cloud)| cloud).collect::<Vec<_>>()
+        });
+        assert_eq!(clouds[0][0].origin, clouds[1][1].origin, "one origin for the shot");
+        clouds[1].clone()
+    });
+    assert_eq!((near[0].origin, far[0].origin), ([0.0; 3], [500_000.0, 0.0, 400_000.0]));
+    // The gas is the same; drops fall elsewhere.
+    for (a, b) in near[0].positions.iter().zip(&far[0].positions) {
+        let moved = [b[0] - a[0], b[1] - a[1], b[2] - a[2] - 300.0];
+        assert!(moved.iter().all(|meters| meters.abs() < 1e-4), "{moved:?}");
+    }
+    let mut columns: Vec<u32> = far[1].positions.iter().map(|position| position[0].to_bits()).collect();
+    columns.sort_unstable();
+    columns.dedup();
+    assert!(columns.len() * 10 > far[1].len() * 9, "{} places of {} drops", columns.len(), far[1].len());
+}

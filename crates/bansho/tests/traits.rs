@@ -30,7 +30,7 @@ fn at_middle(frame: &Frame) -> f64 {
 
 fn fogged(depth: f64) -> String {
     format!(
-        "{CAMERA}[[absorber]]\nname = \"fog\"\nnear = 1\nfar = 3\nextinction = [0.7, 0.7, 0.7]\n\
+        "{CAMERA}[[absorber]]\nname = \"mist\"\nnear = 1\nfar = 3\nextinction = [0.7, 0.7, 0.7]\n\
          [[emitter]]\nname = \"lamp\"\nposition = [0, 0, -{depth}]\nradius = 0.5\n"
     )
 }
@@ -65,12 +65,12 @@ fn layers_and_aovs_come_to_the_beauty() {
     let options = PlanOptions { layers: true, aovs: true, ..PlanOptions::default() };
     let frame = render(&fogged(2.0), &options, 0);
     for (c, suffix) in ["R", "G", "B", "A"].iter().enumerate() {
-        let (fog, lamp) = (channel(&frame, &format!("fog.{suffix}")), channel(&frame, &format!("lamp.{suffix}")));
+        let (fog, lamp) = (channel(&frame, &format!("mist.{suffix}")), channel(&frame, &format!("lamp.{suffix}")));
         for (index, pixel) in frame.beauty.pixels().iter().enumerate() {
             assert!((fog[index] + lamp[index] - pixel[c]).abs() < 1e-6 * (1.0 + pixel[c].abs()));
         }
     }
-    assert!(channel(&frame, "fog.optical_depth").iter().all(|depth| (depth - 1.4).abs() < 1e-6));
+    assert!(channel(&frame, "mist.optical_depth").iter().all(|depth| (depth - 1.4).abs() < 1e-6));
 }
 
 #[test]
@@ -238,7 +238,8 @@ fn a_crop_is_the_same_part_of_the_whole_with_and_without_bent_light() {
         };
         let (whole, part) = (drawn(None), drawn(Some(crop)));
         assert_eq!(part.beauty, whole.beauty.crop(crop).unwrap(), "{bend}");
-        let row = |frame: &Frame, y: usize, x: usize| channel(frame, "fog.optical_depth")[y * frame.beauty.width() + x];
+        let row =
+            |frame: &Frame, y: usize, x: usize| channel(frame, "mist.optical_depth")[y * frame.beauty.width() + x];
         assert_eq!(row(&part, 3, 5), row(&whole, 24, 42));
         let pixels =
             |frame: &Frame| match display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded).pixels {
@@ -307,14 +308,14 @@ fn layers_come_to_the_beauty_behind_several_bends() {
     let lamp = |name: &str, depth: f64| {
         format!("[[emitter]]\nname = \"{name}\"\nposition = [0, 0, -{depth}]\nradius = 0.3\nbend = 0.05\n")
     };
-    let fog = "[[absorber]]\nname = \"fog\"\nnear = 1\nfar = 6\nextinction = [0.1, 0.2, 0.3]\n";
+    let fog = "[[absorber]]\nname = \"mist\"\nnear = 1\nfar = 6\nextinction = [0.1, 0.2, 0.3]\n";
     let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\n{fog}{}{}", lamp("near", 2.0), lamp("far", 4.0));
     let options = PlanOptions { layers: true, ..PlanOptions::default() };
     let plan = plan_with(&text, &options, Arc::new(checkerboard(120, 90, Some(8.0))));
     let frame = draw(&mut plan.open(), 1);
     for (c, suffix) in ["R", "G", "B"].into_iter().enumerate() {
         let layers: Vec<&[f32]> =
-            ["fog", "near", "far", "plate"].map(|layer| channel(&frame, &format!("{layer}.{suffix}"))).into();
+            ["mist", "near", "far", "plate"].map(|layer| channel(&frame, &format!("{layer}.{suffix}"))).into();
         for (index, pixel) in frame.beauty.pixels().iter().enumerate() {
             let sum: f32 = layers.iter().map(|layer| layer[index]).sum();
             assert!((sum - pixel[c]).abs() < 1e-4 * pixel[c].max(1.0), "{suffix} of {index}: {sum} {}", pixel[c]);

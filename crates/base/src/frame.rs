@@ -89,7 +89,19 @@ pub struct PhenomenonMetadata {
     pub entries: Vec<MetadataEntry>,
 }
 
-/// Display pixels: sRGB-encoded, straight alpha.
+/// What the codes of a picture stand for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DisplayEncoding {
+    /// Colors for display, sRGB-encoded.
+    #[default]
+    Srgb,
+    /// Scene-linear light in ACEScg (AP1, D60), clamped to 0 to 1: the view `raw`.
+    LinearAcescg,
+    /// No colors, such as motion or coverage: nothing that reads it may convert it.
+    Data,
+}
+
+/// Display pixels with straight alpha; what the codes stand for is said by [`DisplayEncoding`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DisplayPixels {
     /// 8 bits per channel.
@@ -109,6 +121,8 @@ pub struct DisplayImage {
     pub opaque: bool,
     /// Convention of its straight alpha, if it is not opaque.
     pub alpha: AlphaConvention,
+    /// What its codes stand for.
+    pub encoding: DisplayEncoding,
     /// Pixels, row after row from the top.
     pub pixels: DisplayPixels,
 }

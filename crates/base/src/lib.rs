@@ -12,4 +12,5 @@ pub mod math;
 pub mod noise;
 pub mod parameters;
 pub mod phenomenon;
+pub mod tables;
 pub mod world;

@@ -31,7 +31,6 @@ macro_rules! with_iterators_of {
             /// What the methods that return an iterator give.
             pub(crate) fn adapters() -> Vec<Vec<usize>> {
                 let values = || (0..1000_usize).into_par_iter();
-                let sums = |(a, b, c, d, e, f, g)| a + b + c + d + e + f + g;
                 let reversed: Vec<usize> = (0..1000).rev().collect();
                 vec![
                     values().with_min_len(64).with_max_len(128).map(|value| value * value).collect(),
@@ -40,10 +39,12 @@ macro_rules! with_iterators_of {
                     values().filter(|value| value % 3 == 0).collect(),
                     values().filter_map(|value| (value % 3 == 0).then_some(value + 1)).collect(),
                     values().flat_map_iter(|value| 0..value % 5).collect(),
-                    (values(), values(), 0..999, values(), values(), &[3; 1000], vec![4; 1000])
-                        .into_par_iter()
+                    values()
+                        .zip(0..999)
+                        .zip(&[3; 1000])
+                        .zip(vec![4; 1000])
                         .enumerate()
-                        .map(|(index, (a, b, c, d, e, f, g))| index * sums((a, b, c, d, e, *f, g)))
+                        .map(|(index, (((a, b), c), d))| index * (a + b + c + d))
                         .collect(),
                 ]
             }
@@ -66,7 +67,7 @@ macro_rules! with_iterators_of {
                 values().for_each_with(5, |scratch, value| add(*scratch + value));
                 let tried = values().try_for_each(|value| fails_from(1000)(value).map(&add));
                 vec![
-                    vec![values().reduce(|| 0, usize::max), values().sum(), count.into_inner()],
+                    vec![values().reduce_with(usize::max).unwrap_or(0), values().sum(), count.into_inner()],
                     odd.into_iter().map(usize::from).collect(),
                     halves,
                     target,

@@ -56,6 +56,19 @@ pub(crate) fn code(error: &anyhow::Error) -> u8 {
     }
 }
 
+/// The message of an error with those of its causes, each once: many messages contain that of their cause.
+pub(crate) fn message(error: &anyhow::Error) -> String {
+    let mut message = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if message.is_empty() {
+            message = cause;
+        } else if !message.contains(&cause) {
+            message = format!("{message}: {cause}");
+        }
+    }
+    message
+}
+
 /// Prints an `error:` line for each error that has not been printed yet, and returns the exit code.
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     if !error.is::<ReportedError>() {
@@ -65,7 +78,7 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
         };
         match error.downcast_ref::<JobError>().or(of_farm) {
             Some(job) => print_job_error(job),
-            None => print_message("error", &format!("{error:#}")),
+            None => print_message("error", &message(error)),
         }
     }
     ExitCode::from(code(error))
@@ -80,5 +93,21 @@ pub(crate) fn print_job_error(error: &JobError) {
             flags::hint_for_scene(scene).iter().for_each(|hint| print_message("hint", hint));
         }
         None => print_message("error", &flags::error_message(error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use super::*;
+
+    #[test]
+    fn causes_are_told_once() {
+        let path = "/gone".into();
+        let error = FarmError::Io { path, source: io::Error::other("it is away") };
+        assert_eq!(message(&error.into()), "/gone: it is away");
+        let error = anyhow::Error::from(io::Error::other("no more")).context("--threads 9");
+        assert_eq!(message(&error), "--threads 9: no more");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::{error::Error, io};
 
+use crate::output::shell_word;
 use bansho::{
     SceneError,
     base::{
@@ -9,7 +10,7 @@ use bansho::{
         parameters::{Problem, ProblemKind},
     },
     job::{ChannelKind, JobError, OptionError, SheetKind, StreakList, StreaksError, Warning},
-    media::{MediaError, assets::limits::TEXT_BYTES, files::input::InputError},
+    media::{MediaError, files::input::InputError, limits::TEXT_BYTES},
 };
 
 /// The message of an error.
@@ -18,7 +19,7 @@ pub(crate) fn error_message(error: &JobError) -> String {
         JobError::Unreadable { path, source: InputError::Io(source), suggestion: None }
             if source.kind() == io::ErrorKind::NotFound =>
         {
-            format!("{error}; `bansho new {}` writes a new scene", path.display())
+            format!("{error}; `bansho new {}` writes a new scene", shell_word(path))
         }
         JobError::Option(OptionError::NotMadeByBansho { .. }) | JobError::Media(MediaError::NotMadeByBansho { .. }) => {
             format!("{error}, or --overwrite to replace it")
@@ -71,6 +72,7 @@ fn flag_of_error(error: &JobError) -> Option<&'static str> {
         JobError::Option(OptionError::ChannelsUnsupported { channels: ChannelKind::Aovs, .. }) => Some("--aovs"),
         JobError::Option(OptionError::MetadataUnsupported { .. }) => Some("--metadata"),
         JobError::Option(OptionError::RawAlpha) => Some("--alpha"),
+        JobError::Option(OptionError::RawFormat { .. }) => Some("--view"),
         JobError::Option(OptionError::TooFewFrames { .. }) => Some("--contact-sheet"),
         JobError::Option(OptionError::TileCount { sheet, .. } | OptionError::SheetSize { sheet, .. }) => {
             Some(match sheet {

@@ -14,7 +14,7 @@ use std::{
     time::Duration,
 };
 
-use bansho::media::files::temporary_files;
+use bansho::media::files::atomic;
 use signal_hook::{
     consts::{SIGINT, SIGTERM},
     flag, low_level,
@@ -44,6 +44,9 @@ pub(crate) fn install_handlers() -> io::Result<()> {
         flag::register(signal, was_signaled.clone())?;
         flag::register_usize(signal, SIGNAL.clone(), signal as usize)?;
     }
+    // A file that would be larger than allowed (`ulimit -f`) is an error of writing it rather than the end of the program.
+    #[cfg(unix)]
+    flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
     thread::Builder::new().name("signals".into()).spawn(watch).map(drop)
 }
 
@@ -64,7 +67,7 @@ fn watch() {
     let (done, wait) = mpsc::channel();
     // Both may block: on a disk that does not respond, on a pipe that nobody reads.
     let clean_up = move || {
-        temporary_files::abandon_all();
+        atomic::abandon_all();
         print_message.iter().for_each(|print_message| print_message());
         // Fails only after the timeout.
         let _ = done.send(());

@@ -42,7 +42,6 @@ fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::New(args) => command::new::run(args),
         Command::Check(args) => command::check::run(args),
-        Command::Upgrade(args) => command::upgrade::run(args),
         Command::Schema => command::generated::run_schema(),
         Command::Render(args) => command::render::run(args),
         Command::Farm(args) => command::farm::run(args),

@@ -27,14 +27,14 @@ use egui::{ClippedPrimitive, TexturesDelta, epaint::Primitive};
 
 pub use app::App;
 pub use pixel_rect::PixelRect;
-use primitives::{DrawPrimitive, Viewport};
+use primitives::{DrawPrimitive, FramebufferSize};
 use textures::Textures;
-use tiles::TileGrid;
+use tiles::FramebufferTiles;
 
 /// Rasterizes egui's meshes into a retained framebuffer: only what changed since the previous frame is painted.
 pub struct Painter {
     textures: Textures,
-    tile_grid: TileGrid,
+    tile_grid: FramebufferTiles,
     primitives: Vec<DrawPrimitive>,
     /// A pool of its own: the application's pool may be busy with long jobs.
     pool: Option<rayon::ThreadPool>,
@@ -44,7 +44,7 @@ impl Default for Painter {
     fn default() -> Self {
         // Without a thread pool, the calling thread paints.
         let pool = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("paint {index}")).build().ok();
-        Self { textures: Textures::default(), tile_grid: TileGrid::default(), primitives: Vec::new(), pool }
+        Self { textures: Textures::default(), tile_grid: FramebufferTiles::default(), primitives: Vec::new(), pool }
     }
 }
 
@@ -68,7 +68,7 @@ impl Painter {
     /// Paints `primitives` into a framebuffer of `size` pixels with `pixels_per_point` pixels per egui point. Returns the rectangles that
     /// changed.
     pub fn paint(&mut self, primitives: &[ClippedPrimitive], pixels_per_point: f32, size: [u32; 2]) -> Vec<PixelRect> {
-        let target = Viewport { pixels_per_point, size: size.map(|side| side.min(i32::MAX as u32) as i32) };
+        let target = FramebufferSize { pixels_per_point, size: size.map(|side| side.min(i32::MAX as u32) as i32) };
         self.primitives.clear();
         for ClippedPrimitive { clip_rect, primitive } in primitives {
             if let Primitive::Mesh(mesh) = primitive {
@@ -83,7 +83,7 @@ impl Painter {
 
     /// Discards the framebuffer: the next frame paints everything.
     pub fn invalidate(&mut self) {
-        self.tile_grid = TileGrid::default();
+        self.tile_grid = FramebufferTiles::default();
     }
 
     /// Copies the pixels of `area` into `into`, whose rows have `stride` pixels, as 0x00RRGGBB.

@@ -20,14 +20,14 @@ const TEXEL_TOLERANCE: f64 = 1.0 / 512.0;
 pub(super) struct DrawPrimitive {
     /// Its bounds within its clip rectangle, never empty.
     pub(super) area: PixelRect,
-    pub(super) shape: Shape,
+    pub(super) shape: PrimitiveShape,
     /// Hash of its geometry, colors and texture id; texels are tracked by [`Textures`].
     pub(super) hash: u64,
 }
 
 /// How a primitive fills its area; textures by slot.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Shape {
+pub(super) enum PrimitiveShape {
     /// One color.
     Fill(Rgba),
     /// One texel per pixel; `origin` is the texel of pixel (0, 0).
@@ -56,13 +56,13 @@ impl TexelMapping {
 
 /// The framebuffer that is painted.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Viewport {
+pub(super) struct FramebufferSize {
     pub(super) pixels_per_point: f32,
     /// Pixels.
     pub(super) size: [i32; 2],
 }
 
-impl Viewport {
+impl FramebufferSize {
     /// Appends the primitives of `mesh` within `clip`.
     pub(super) fn add(&self, mesh: &Mesh, clip: Rect, textures: &Textures, primitives: &mut Vec<DrawPrimitive>) {
         let clip = self.clip(clip);
@@ -184,12 +184,12 @@ impl MeshContext<'_> {
             if color == [0; 4] {
                 return None;
             }
-            Shape::Fill(color)
+            PrimitiveShape::Fill(color)
         } else {
             self.picture(low, high, tint)
         };
         let hash = match shape {
-            Shape::Fill(color) => mix_hash(0, [u64::from(u32::from_le_bytes(color))]),
+            PrimitiveShape::Fill(color) => mix_hash(0, [u64::from(u32::from_le_bytes(color))]),
             _ => hash_vertices(self.id, [low, high]),
         };
         Some(DrawPrimitive { area, shape, hash: mix_hash(hash, area.hash_words()) })
@@ -199,7 +199,7 @@ impl MeshContext<'_> {
         if corner.texel == [0.0; 2] { self.first_texel } else { self.texture.sample_rounded(corner.texel) }
     }
 
-    fn picture(&self, low: &Corner, high: &Corner, tint: Rgba) -> Shape {
+    fn picture(&self, low: &Corner, high: &Corner, tint: Rgba) -> PrimitiveShape {
         let mut mapping = TexelMapping { origin: [0.0; 2], step: [0.0; 2] };
         let mut origin = [0; 2];
         let mut exact = true;
@@ -214,9 +214,9 @@ impl MeshContext<'_> {
             origin[axis] = nearest as i64;
         }
         if exact {
-            Shape::Texels { texture: self.slot, origin, tint }
+            PrimitiveShape::Texels { texture: self.slot, origin, tint }
         } else {
-            Shape::Picture { texture: self.slot, mapping, tint }
+            PrimitiveShape::Picture { texture: self.slot, mapping, tint }
         }
     }
 
@@ -227,7 +227,7 @@ impl MeshContext<'_> {
         let hash = mix_hash(hash_vertices(self.id, &corners), area.hash_words());
         (!area.is_empty()).then_some(DrawPrimitive {
             area,
-            shape: Shape::Triangle { texture: self.slot, triangle },
+            shape: PrimitiveShape::Triangle { texture: self.slot, triangle },
             hash,
         })
     }

@@ -5,9 +5,9 @@ use egui::Color32;
 use super::{
     blend::{Rgba, blend_over, blend_over_f32, blend_tinted_over, pack_xrgb},
     pixel_rect::PixelRect,
-    primitives::{DrawPrimitive, Shape, TexelMapping},
+    primitives::{DrawPrimitive, PrimitiveShape, TexelMapping},
     textures::{FilterTaps, Texture, Textures},
-    triangle::{Coloring, Triangle},
+    triangle::{Triangle, TriangleColoring},
 };
 
 /// Width of a tile, pixels.
@@ -39,22 +39,22 @@ impl TilePixels<'_> {
             return;
         }
         match &primitive.shape {
-            Shape::Fill(color) => {
+            PrimitiveShape::Fill(color) => {
                 for y in area.top..area.bottom {
                     fill(self.row(y, area.left, area.right), *color);
                 }
             }
-            Shape::Texels { texture, origin, tint } => {
+            PrimitiveShape::Texels { texture, origin, tint } => {
                 if let Some(texture) = textures.get(*texture) {
                     self.texels(area, texture, *origin, *tint);
                 }
             }
-            Shape::Picture { texture, mapping, tint } => {
+            PrimitiveShape::Picture { texture, mapping, tint } => {
                 if let Some(texture) = textures.get(*texture) {
                     self.picture(area, texture, mapping, *tint);
                 }
             }
-            Shape::Triangle { texture, triangle } => {
+            PrimitiveShape::Triangle { texture, triangle } => {
                 if let Some(texture) = textures.get(*texture) {
                     self.triangle(area, triangle, texture);
                 }
@@ -105,7 +105,7 @@ impl TilePixels<'_> {
 
     fn triangle(&mut self, area: PixelRect, triangle: &Triangle, texture: &Texture) {
         let coverage = triangle.coverage();
-        if let Coloring::Plain(color) = triangle.color {
+        if let TriangleColoring::Plain(color) = triangle.color {
             for y in area.top..area.bottom {
                 let [from, to] = coverage.span(y, area.left, area.right);
                 fill(self.row(y, from, to), color);
@@ -124,8 +124,8 @@ impl TilePixels<'_> {
             for (x, pixel) in self.row(y, from, to).iter_mut().enumerate() {
                 let at = |[start, step]: [f32; 2]| start + x as f32 * step;
                 let texel = match triangle.color {
-                    Coloring::Plain(texel) | Coloring::Blended(texel) => texel.map(f32::from),
-                    Coloring::Textured => texture.at(coordinates.map(at)),
+                    TriangleColoring::Plain(texel) | TriangleColoring::Blended(texel) => texel.map(f32::from),
+                    TriangleColoring::Textured => texture.at(coordinates.map(at)),
                 };
                 // Rounding errors may exceed the range.
                 let color = colors.map(|channel| at(channel).clamp(0.0, 255.0));
@@ -141,12 +141,12 @@ pub(super) fn occludes(primitive: &DrawPrimitive, area: PixelRect, textures: &Te
         return false;
     }
     match &primitive.shape {
-        Shape::Fill(color) => color[3] == 255,
-        Shape::Texels { texture, tint, .. } | Shape::Picture { texture, tint, .. } => {
+        PrimitiveShape::Fill(color) => color[3] == 255,
+        PrimitiveShape::Texels { texture, tint, .. } | PrimitiveShape::Picture { texture, tint, .. } => {
             tint[3] == 255 && textures.get(*texture).is_some_and(Texture::is_opaque)
         }
-        Shape::Triangle { triangle, .. } => {
-            matches!(triangle.color, Coloring::Plain([.., 255])) && triangle.coverage().contains_rect(area)
+        PrimitiveShape::Triangle { triangle, .. } => {
+            matches!(triangle.color, TriangleColoring::Plain([.., 255])) && triangle.coverage().contains_rect(area)
         }
     }
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     pixel_rect::PixelRect,
-    primitives::{DrawPrimitive, Shape, mix_hash},
+    primitives::{DrawPrimitive, PrimitiveShape, mix_hash},
     raster::{TILE_WIDTH, TilePixels, occludes},
     textures::Textures,
 };
@@ -17,7 +17,7 @@ const PARALLEL_TILES_MIN: usize = 4;
 
 /// All tiles of a framebuffer, row by row.
 #[derive(Default)]
-pub(super) struct TileGrid {
+pub(super) struct FramebufferTiles {
     size: [i32; 2],
     /// Tiles per row.
     tiles_across: usize,
@@ -37,7 +37,7 @@ struct Tile {
     primitives: Vec<u32>,
 }
 
-impl TileGrid {
+impl FramebufferTiles {
     /// Paints `primitives` over black in the tiles that changed, or in all tiles where `size` changed. Returns the painted rectangles.
     pub(super) fn paint(
         &mut self,
@@ -151,8 +151,9 @@ impl Tile {
 
 /// Whether texels of `primitive` in `area` changed.
 fn has_changed(primitive: &DrawPrimitive, area: PixelRect, textures: &Textures) -> bool {
-    let (Shape::Texels { texture, .. } | Shape::Picture { texture, .. } | Shape::Triangle { texture, .. }) =
-        primitive.shape
+    let (PrimitiveShape::Texels { texture, .. }
+    | PrimitiveShape::Picture { texture, .. }
+    | PrimitiveShape::Triangle { texture, .. }) = primitive.shape
     else {
         return false;
     };
@@ -160,16 +161,16 @@ fn has_changed(primitive: &DrawPrimitive, area: PixelRect, textures: &Textures) 
     let overlap = primitive.area.within(area);
     let ends = [[overlap.left, overlap.top], [overlap.right - 1, overlap.bottom - 1]];
     match primitive.shape {
-        Shape::Fill(_) => false,
-        Shape::Texels { origin, .. } => {
+        PrimitiveShape::Fill(_) => false,
+        PrimitiveShape::Texels { origin, .. } => {
             let texel = |end: [i32; 2], axis: usize| (i64::from(end[axis]) + origin[axis]) as f32;
             texture.has_changed(ends.map(|end| [0, 1].map(|axis| texel(end, axis))), 0.0)
         }
         // Bilinear filtering reads the neighboring texels.
-        Shape::Picture { mapping, .. } => {
+        PrimitiveShape::Picture { mapping, .. } => {
             texture.has_changed(ends.map(|end| [0, 1].map(|axis| mapping.texel(end[axis], axis))), 1.0)
         }
-        Shape::Triangle { triangle, .. } => texture.has_changed(triangle.texels, 1.0),
+        PrimitiveShape::Triangle { triangle, .. } => texture.has_changed(triangle.texels, 1.0),
     }
 }
 

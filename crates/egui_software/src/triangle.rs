@@ -33,7 +33,7 @@ impl Corner {
 
 /// How a triangle is colored.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Coloring {
+pub(super) enum TriangleColoring {
     /// One color.
     Plain(Rgba),
     /// Vertex colors times one texel.
@@ -46,7 +46,7 @@ pub(super) enum Coloring {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triangle {
     corners: [Corner; 3],
-    pub(super) color: Coloring,
+    pub(super) color: TriangleColoring,
     /// Bounding box of its texture coordinates, texels.
     pub(super) texels: [[f32; 2]; 2],
 }
@@ -77,14 +77,14 @@ impl Triangle {
         let color = if texels[0] == texels[1] {
             let texel = texel(&a);
             if a.color == b.color && b.color == c.color {
-                Coloring::Plain(multiply(texel, a.color))
+                TriangleColoring::Plain(multiply(texel, a.color))
             } else {
-                Coloring::Blended(texel)
+                TriangleColoring::Blended(texel)
             }
         } else {
-            Coloring::Textured
+            TriangleColoring::Textured
         };
-        let is_visible = color != Coloring::Plain([0; 4]);
+        let is_visible = color != TriangleColoring::Plain([0; 4]);
         is_visible.then_some(Self { corners, color, texels })
     }
 
@@ -97,13 +97,13 @@ impl Triangle {
     }
 
     /// Its edge functions.
-    pub(super) fn coverage(&self) -> Coverage {
+    pub(super) fn coverage(&self) -> TriangleCoverage {
         let [a, b, c] = self.corners.map(|corner| corner.at.map(i64::from));
-        Coverage { edges: [edge(a, b), edge(b, c), edge(c, a)] }
+        TriangleCoverage { edges: [edge(a, b), edge(b, c), edge(c, a)] }
     }
 
     /// Linear interpolation of a vertex attribute.
-    pub(super) fn plane(&self, of: impl Fn(&Corner) -> f32) -> Plane {
+    pub(super) fn plane(&self, of: impl Fn(&Corner) -> f32) -> AttributePlane {
         let position = |corner: &Corner| corner.at.map(|at| f64::from(at) / f64::from(SUBPIXELS));
         let [a, b, c] = [0, 1, 2].map(|corner| position(&self.corners[corner]));
         let [at_a, at_b, at_c] = [0, 1, 2].map(|corner| f64::from(of(&self.corners[corner])));
@@ -112,7 +112,7 @@ impl Triangle {
         let (by_first, by_second) = (at_b - at_a, at_c - at_a);
         let step_x = (by_first * second[1] - by_second * first[1]) / area;
         let step_y = (by_second * first[0] - by_first * second[0]) / area;
-        Plane { step_x, step_y, origin: at_a + (0.5 - a[0]) * step_x + (0.5 - a[1]) * step_y }
+        AttributePlane { step_x, step_y, origin: at_a + (0.5 - a[0]) * step_x + (0.5 - a[1]) * step_y }
     }
 }
 
@@ -133,11 +133,11 @@ fn edge(a: [i64; 2], b: [i64; 2]) -> Edge {
 }
 
 /// The pixels whose centers lie inside a triangle.
-pub(super) struct Coverage {
+pub(super) struct TriangleCoverage {
     edges: [Edge; 3],
 }
 
-impl Coverage {
+impl TriangleCoverage {
     /// The half-open range of covered pixels of row `y` within `left..right`.
     pub(super) fn span(&self, y: i32, left: i32, right: i32) -> [i32; 2] {
         let (mut from, mut to) = (i64::from(left), i64::from(right));
@@ -166,14 +166,14 @@ impl Coverage {
 
 /// A vertex attribute, linear in screen space.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plane {
+pub(super) struct AttributePlane {
     step_x: f64,
     step_y: f64,
     /// The value at the center of pixel (0, 0).
     origin: f64,
 }
 
-impl Plane {
+impl AttributePlane {
     /// The value at the center of pixel `x` of row `y`, and its increment per pixel to the right.
     pub(super) fn row(&self, x: i32, y: i32) -> [f32; 2] {
         let start = self.origin + f64::from(x) * self.step_x + f64::from(y) * self.step_y;

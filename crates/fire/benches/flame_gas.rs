@@ -25,9 +25,9 @@ use bansho_base::{
 };
 
 use bansho_fire::particles::{
-    Particles,
+    GasParticles,
     render::{
-        BufferPool, FadeOut, Gas, PreparedGas, RenderingParameters, line_gradient, line_integral, soot_absorption,
+        BufferPool, FadeOut, Gas, GasRenderingParameters, PreparedGas, line_gradient, line_integral, soot_absorption,
     },
 };
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -50,7 +50,7 @@ fn view() -> View {
     View::new(camera, Shutter { open: TIME, close: TIME + 1.0 / 60.0 }, TIME + 1.0 / 30.0, SIZE, 0)
 }
 
-fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
+fn gas<'a>(particles: &'a GasParticles, buffers: &'a BufferPool) -> Gas<'a> {
     Gas {
         particles,
         time: TIME,
@@ -66,13 +66,13 @@ fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
 
 /// The particles and the view that are drawn, with scratch memory.
 struct Subject {
-    particles: Particles,
+    particles: GasParticles,
     view: View,
     buffers: BufferPool,
 }
 
 /// Prepares the gas and passes it to `visit`.
-fn prepared(subject: &Subject, rendering: &RenderingParameters, visit: impl FnOnce(&PreparedGas)) {
+fn prepared(subject: &Subject, rendering: &GasRenderingParameters, visit: impl FnOnce(&PreparedGas)) {
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let gas = gas(&subject.particles, &subject.buffers);
@@ -82,7 +82,7 @@ fn prepared(subject: &Subject, rendering: &RenderingParameters, visit: impl FnOn
 }
 
 /// Draws the gas, after calling `before`.
-fn draw(subject: &Subject, rendering: &RenderingParameters, before: impl Fn(&PreparedGas) + Sync) {
+fn draw(subject: &Subject, rendering: &GasRenderingParameters, before: impl Fn(&PreparedGas) + Sync) {
     prepared(subject, rendering, |prepared| {
         before(prepared);
         (0..SIZE[1].div_ceil(STRIP)).into_par_iter().for_each_init(Strip::default, |strip, index| {
@@ -95,7 +95,11 @@ fn draw(subject: &Subject, rendering: &RenderingParameters, before: impl Fn(&Pre
 }
 
 /// Evaluates every sprite at every pixel that it covers, with `WIDTH` values: light or deflection.
-fn naive<const WIDTH: usize>(particles: &Particles, view: &View, value: impl Fn(usize, [f64; 2], f64) -> [f64; WIDTH]) {
+fn naive<const WIDTH: usize>(
+    particles: &GasParticles,
+    view: &View,
+    value: impl Fn(usize, [f64; 2], f64) -> [f64; WIDTH],
+) {
     let mut picture = vec![[0.0_f64; WIDTH]; SIZE[0] * SIZE[1]];
     for index in 0..particles.len() {
         let position = DVec3::from(particles.positions().map(|values| f64::from(values[index])));
@@ -120,7 +124,7 @@ fn gas_720p(criterion: &mut Criterion) {
     let subject =
         Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), buffers: BufferPool::default() };
     let Subject { particles, view, .. } = &subject;
-    let rendering = RenderingParameters::default();
+    let rendering = GasRenderingParameters::default();
     let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);
     let mut group = criterion.benchmark_group("flame gas 1280x720");
     group.sample_size(10);
@@ -132,7 +136,7 @@ fn gas_720p(criterion: &mut Criterion) {
             bencher.iter(|| draw(&subject, &rendering, |prepared| assert!(prepared.deflection().is_some())));
         });
     });
-    let smooth = RenderingParameters { detail: 0.0, ..rendering.clone() };
+    let smooth = GasRenderingParameters { detail: 0.0, ..rendering.clone() };
     group.bench_function("sums alone", |bencher| {
         pool.install(|| bencher.iter(|| draw(&subject, &smooth, |_| ())));
     });
@@ -148,7 +152,7 @@ fn gas_720p(criterion: &mut Criterion) {
         });
     });
     // Gas that neither emits nor absorbs contributes only to the haze.
-    let clear = RenderingParameters { soot_gain: 0.0, base_blue: 0.0, ..rendering.clone() };
+    let clear = GasRenderingParameters { soot_gain: 0.0, base_blue: 0.0, ..rendering.clone() };
     group.bench_function("haze of clear gas", |bencher| {
         pool.install(|| {
             bencher.iter(|| {

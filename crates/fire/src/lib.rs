@@ -15,6 +15,13 @@ pub mod sparks;
 
 use bansho_base::color;
 
+/// The gas flow of a flame as a fraction of full flow, a quantity of
+/// [`PhenomenonTable::with_quantity`](bansho_base::tables::PhenomenonTable::with_quantity): 0 puts it out.
+pub const GAS_FLOW: &str = "gas flow";
+/// The position of a flame, m, a quantity of [`PhenomenonTable::with_quantity`](bansho_base::tables::PhenomenonTable::with_quantity). Gas that burns already
+/// stays where it is.
+pub const POSITION: &str = "position";
+
 /// Color of the chemiluminescence of burning hydrocarbons, the CH (431 nm) and C2 (516 nm) bands: ACEScg of luminance 1.
 pub(crate) fn chemiluminescence_color() -> [f32; 3] {
     let (ch, c2) = (color::line_xyz(431.0), color::line_xyz(516.0));

@@ -5,7 +5,7 @@ use std::{hint::black_box, path::Path};
 use bansho_base::{
     camera::CameraHeader,
     color::AlphaConvention,
-    frame::{DisplayImage, DisplayPixels, Frame, FrameHeader},
+    frame::{DisplayEncoding, DisplayImage, DisplayPixels, Frame, FrameHeader},
     image::{Image, Rect},
 };
 use bansho_media::{
@@ -13,8 +13,8 @@ use bansho_media::{
     files::naming::OutputPattern,
     format::OutputKind,
     output::{
-        resume,
-        sink::{FrameSlot, Picture, Sink, SinkOptions},
+        frame_file,
+        sink::{FinishedPicture, FrameSlot, Sink, SinkOptions},
     },
     png,
 };
@@ -47,7 +47,14 @@ fn dithered(i: usize) -> [u8; 4] {
 
 fn display() -> DisplayImage {
     let pixels = DisplayPixels::Eight((0..WIDTH * HEIGHT).map(dithered).collect());
-    DisplayImage { width: WIDTH, height: HEIGHT, opaque: false, alpha: AlphaConvention::Linear, pixels }
+    DisplayImage {
+        width: WIDTH,
+        height: HEIGHT,
+        opaque: false,
+        alpha: AlphaConvention::Linear,
+        encoding: DisplayEncoding::Srgb,
+        pixels,
+    }
 }
 
 fn frame() -> Frame {
@@ -115,7 +122,7 @@ fn gif_film(picture: &DisplayImage, folder: &Path) {
     let pattern = OutputPattern::parse(&folder.join("a.gif"), FILM_FRAMES).expect("a name");
     let sink = Sink::open(pattern, SinkOptions::new([WIDTH, HEIGHT], [24, 1], FILM_FRAMES)).expect("a sink");
     (0..FILM_FRAMES).into_par_iter().for_each(|index| {
-        sink.write(FrameSlot { index, number: 0 }, Picture::Display(picture, &[0; 32])).expect("a frame");
+        sink.write(FrameSlot { index, number: 0 }, FinishedPicture::Display(picture, &[0; 32])).expect("a frame");
     });
     sink.finish().expect("a film");
 }
@@ -152,7 +159,7 @@ fn png_frame(criterion: &mut Criterion) {
     group.bench_function("plain", |bencher| bencher.iter(|| black_box(plain_png(pixels))));
     let file = encode();
     group.bench_function("is it whole", |bencher| {
-        bencher.iter(|| black_box(resume::fingerprint(&file, OutputKind::Png)));
+        bencher.iter(|| black_box(frame_file::fingerprint(&file, OutputKind::Png)));
     });
     group.finish();
 }
@@ -165,7 +172,7 @@ fn exr_frame(criterion: &mut Criterion) {
     group.bench_function("plain", |bencher| bencher.iter(|| black_box(plain_exr(&frame))));
     let file = encode();
     group.bench_function("is it whole", |bencher| {
-        bencher.iter(|| black_box(resume::fingerprint(&file, OutputKind::Exr)));
+        bencher.iter(|| black_box(frame_file::fingerprint(&file, OutputKind::Exr)));
     });
     group.finish();
 }

@@ -19,6 +19,15 @@ pub enum MediaError {
         /// The file that was to be written.
         path: PathBuf,
     },
+    /// The file would be larger than the system allows.
+    #[error(
+        "{path}: the file would be larger than this process may write (`ulimit -f`) or the disk can hold; no incomplete file was left there",
+        path = .path.display()
+    )]
+    FileTooLarge {
+        /// The file that was to be written.
+        path: PathBuf,
+    },
     /// No permission to write there.
     #[error("{path}: not allowed to write there; choose a folder you may write to", path = .path.display())]
     NotAllowed {
@@ -53,6 +62,12 @@ pub enum MediaError {
     #[error("{path}: is there already and was not made by Bansho; allowed: another name", path = .path.display())]
     NotMadeByBansho {
         /// The file.
+        path: PathBuf,
+    },
+    /// The path is a link where a file of a fixed name is to be written.
+    #[error("{path}: is a link; allowed: no file, or one that Bansho made", path = .path.display())]
+    IsLink {
+        /// The link.
         path: PathBuf,
     },
     /// A parent folder is a file.
@@ -108,6 +123,12 @@ pub enum MediaError {
         path: PathBuf,
         /// The pixels that it takes.
         expected: PictureFormat,
+    },
+    /// Pixels that are not sRGB for a format that cannot say what else they are.
+    #[error("{path}: this format takes sRGB pixels", path = .path.display())]
+    NotSrgb {
+        /// The file that was to be written.
+        path: PathBuf,
     },
     /// A frame of a film was added too early, twice, or beyond the end.
     #[error(
@@ -198,9 +219,8 @@ impl MediaError {
     pub fn from_io(path: impl Into<PathBuf>, source: io::Error) -> Self {
         let path = path.into();
         match source.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
-                Self::DiskFull { path }
-            }
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::DiskFull { path },
+            io::ErrorKind::FileTooLarge => Self::FileTooLarge { path },
             io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => Self::NotAllowed { path },
             io::ErrorKind::IsADirectory => Self::IsFolder { path },
             io::ErrorKind::NotADirectory => Self::NotAFolder { path },

@@ -15,10 +15,10 @@ pub(crate) fn to_hex(bytes: &[u8; 32]) -> String {
 /// Parses 64 hexadecimal digits.
 pub(crate) fn from_hex(text: &[u8]) -> Option<[u8; 32]> {
     let pairs: &[[u8; 2]; 32] = text.as_chunks().0.try_into().ok().filter(|_| text.len() == 64)?;
-    let digit = |letter: u8| char::from(letter).to_digit(16);
     let mut bytes = [0; 32];
-    for (byte, [high, low]) in bytes.iter_mut().zip(pairs) {
-        *byte = (digit(*high)? * 16 + digit(*low)?) as u8;
+    for (byte, pair) in bytes.iter_mut().zip(pairs) {
+        let [high, low] = pair.map(|letter| char::from(letter).to_digit(16));
+        *byte = (high? * 16 + low?) as u8;
     }
     Some(bytes)
 }

@@ -77,6 +77,15 @@ impl OutputKind {
         }
     }
 
+    /// Whether a file can say that its codes are linear light in ACEScg.
+    pub fn takes_linear_acescg(self) -> bool {
+        match self {
+            Self::Png | Self::Exr | Self::Apng => true,
+            // GIF has no color information, and films name their primaries by numbers of ITU-T H.273, which has none for AP1.
+            Self::Gif | Self::Mp4 | Self::Mov | Self::Webm => false,
+        }
+    }
+
     /// Whether it is made by the program `ffmpeg`.
     pub fn needs_ffmpeg(self) -> bool {
         match self {

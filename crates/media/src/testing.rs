@@ -3,7 +3,7 @@
 use bansho_base::{
     camera::CameraHeader,
     color::AlphaConvention,
-    frame::{Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
+    frame::{Channel, DisplayEncoding, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
     image::{Image, Rect},
 };
 
@@ -27,7 +27,7 @@ pub(crate) fn frame(width: usize, height: usize) -> Frame {
 }
 
 fn header(width: usize, height: usize) -> FrameHeader {
-    let matrix = |start: f32| std::array::from_fn(|i| std::array::from_fn(|j| start + (4 * i + j) as f32));
+    let matrix = |start: f64| std::array::from_fn(|i| std::array::from_fn(|j| start + (4 * i + j) as f64));
     FrameHeader {
         number: 1001,
         exposure_ev100: 7.5,
@@ -51,5 +51,12 @@ fn header(width: usize, height: usize) -> FrameHeader {
 pub(crate) fn display(width: usize, height: usize, frame: usize) -> DisplayImage {
     let pixel = |i: usize| [(i * 7 + frame * 40) as u8, (i * 3) as u8, (200 - i % 200) as u8, (i * 11 + frame) as u8];
     let pixels = DisplayPixels::Eight((0..width * height).map(pixel).collect());
-    DisplayImage { width, height, opaque: false, alpha: AlphaConvention::Linear, pixels }
+    DisplayImage {
+        width,
+        height,
+        opaque: false,
+        alpha: AlphaConvention::Linear,
+        encoding: DisplayEncoding::Srgb,
+        pixels,
+    }
 }

@@ -33,6 +33,7 @@ impl<W: Write> ZipWriter<W> {
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> io::Result<()> {
         let start = checked_u32(self.length)?;
         checked_u32(self.length + bytes.len() as u64)?;
+        // All limits are checked before anything is written, so that what was written so far can still be finished.
         let fields = header_fields(name, bytes)?;
         let count = self.count.checked_add(1).ok_or_else(too_large)?;
         self.write_all(&[b"PK\x03\x04", fields.as_slice(), name.as_bytes(), bytes])?;
@@ -51,6 +52,7 @@ impl<W: Write> ZipWriter<W> {
         let (start, size) = (checked_u32(self.length)?, checked_u32(self.directory.len() as u64)?);
         let directory = std::mem::take(&mut self.directory);
         let counts = [self.count.to_le_bytes(); 2].concat();
+        // On this disk and in all: the same number, since there is one disk; no comment.
         let end: [&[u8]; 6] = [b"PK\x05\x06", &[0; 4], &counts, &size.to_le_bytes(), &start.to_le_bytes(), &[0; 2]];
         self.write_all(&[&directory, &end.concat()])?;
         self.out.flush()?;
@@ -70,6 +72,7 @@ impl<W: Write> ZipWriter<W> {
 fn header_fields(name: &str, bytes: &[u8]) -> io::Result<Vec<u8>> {
     let size = checked_u32(bytes.len() as u64)?.to_le_bytes();
     let name = u16::try_from(name.len()).map_err(|_| too_large())?.to_le_bytes();
+    // Packed and unpacked size, of stored files the same; no extra fields.
     let fields: [&[u8]; 6] = [&COMMON_FIELDS, &crc32fast::hash(bytes).to_le_bytes(), &size, &size, &name, &[0; 2]];
     Ok(fields.concat())
 }

@@ -8,7 +8,10 @@ use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
     image::{Image, Rect},
 };
-use bansho_media::{exr, files::atomic};
+use bansho_media::{
+    exr,
+    files::{atomic, overwrite_policy::OverwritePolicy},
+};
 use half::f16;
 
 const SIZE: [usize; 2] = [37, 41];
@@ -21,7 +24,7 @@ fn values(scale: f32) -> Vec<f32> {
 fn frame() -> Frame {
     let count = SIZE[0] * SIZE[1];
     let pixels = (0..count).map(|i| [i as f32 * 0.013, 0.7, 9.0 / (i + 1) as f32, 0.25]).collect();
-    let unit: [[f32; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+    let unit: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
     let header = FrameHeader {
         number: 1,
         exposure_ev100: 0.0,
@@ -119,7 +122,7 @@ fn bpy_reads_every_pass_with_its_type_and_its_colors() {
     assert_eq!(LAYER.len(), 63);
     let folder = tempfile::tempdir().unwrap();
     let (path, frame) = (folder.path().join("a.exr"), frame());
-    atomic::write_bytes(&path, &exr::encode(&frame, &path).unwrap()).unwrap();
+    atomic::write_bytes(&path, &exr::encode(&frame, &path).unwrap(), &OverwritePolicy::default()).unwrap();
     let (facts, passes) = passes_by_blender(&path);
     assert_eq!(facts["color space"], "ACEScg");
 

@@ -6,7 +6,12 @@ use bansho_base::{
     geometry::strokes::Drawing,
     host::assets::{AssetProblem, DepthMap, Encoding, Picture, PictureAlpha, PictureLayers, PictureRemark},
 };
-use bansho_media::assets::{decode_depth, decode_picture, gltf::decode_mesh, limits::MemoryLimit, svg::decode_drawing};
+use bansho_media::{
+    assets::{decode_depth, decode_picture},
+    gltf::decode_mesh,
+    limits::MemoryLimit,
+    svg::decode_drawing,
+};
 use serde_json::Value;
 
 fn folder() -> PathBuf {
@@ -187,19 +192,19 @@ fn random_numbers() -> impl FnMut() -> usize {
     }
 }
 
-/// Whether a changed JPEG is refused, or told to be corrupt.
-fn is_told(bytes: &[u8]) -> bool {
+/// Whether a changed JPEG is refused or reported as corrupt.
+fn is_reported(bytes: &[u8]) -> bool {
     let read = decode_picture(bytes, "jpg", &PictureLayers::default(), MemoryLimit::default());
     read.is_err() || read.is_ok_and(|picture| matches!(picture.remarks[..], [PictureRemark::Corrupt(_)]))
 }
 
 #[test]
-fn corrupt_data_of_a_jpeg_are_told() {
+fn corrupt_data_of_a_jpeg_are_reported() {
     let mut random = random_numbers();
-    let (mut changed, mut told) = (0, 0);
+    let (mut changed, mut reported) = (0, 0);
     for name in ["detailed.jpg", "detailed_restarts.jpg", "detailed_progressive.jpg", "detailed_full.jpg"] {
         let whole = fs::read(folder().join(name)).unwrap();
-        assert!(!is_told(&whole), "{name}");
+        assert!(!is_reported(&whole), "{name}");
         let start = whole.windows(2).position(|pair| pair == [0xff, 0xda]).unwrap() + 14;
         let replaced =
             |range: std::ops::Range<usize>, by: &[u8]| [&whole[..range.start], by, &whole[range.end..]].concat();
@@ -211,26 +216,26 @@ fn corrupt_data_of_a_jpeg_are_told() {
             replaced(middle..middle, &[0xff, 0xd5]),
             replaced(middle..middle, &[0xff, 0x5a]),
         ] {
-            assert!(is_told(&bad), "{name}: {} of {} bytes", bad.len(), whole.len());
+            assert!(is_reported(&bad), "{name}: {} of {} bytes", bad.len(), whole.len());
         }
         for _ in 0..200 {
             let at = start + random() % (whole.len() - start - 2);
             let bad = replaced(at..at + 1, &[whole[at] ^ (1 + random() % 255) as u8]);
-            (changed, told) = (changed + 1, told + usize::from(is_told(&bad)));
+            (changed, reported) = (changed + 1, reported + usize::from(is_reported(&bad)));
         }
     }
     // A change within a number stays a picture; nothing in a JPEG says what it was.
-    assert!(10 * told > 3 * changed, "{told} of {changed} changed bytes are told");
+    assert!(10 * reported > 3 * changed, "{reported} of {changed} changed bytes are reported");
 }
 
 #[test]
-fn restart_markers_out_of_order_are_told() {
+fn restart_markers_out_of_order_are_reported() {
     let mut bytes = fs::read(folder().join("detailed_restarts.jpg")).unwrap();
     let markers: Vec<usize> =
         (0..bytes.len() - 1).filter(|at| bytes[*at] == 0xff && (0xd0..=0xd7).contains(&bytes[at + 1])).collect();
     assert!(markers.len() >= 7, "{markers:?}");
     bytes.swap(markers[2] + 1, markers[3] + 1);
-    assert!(is_told(&bytes));
+    assert!(is_reported(&bytes));
 }
 
 #[test]

@@ -7,14 +7,17 @@ use bansho_base::{
     frame::{Channel, Frame, FrameHeader, Precision},
     image::{Image, Rect},
 };
-use bansho_media::{exr, files::atomic};
+use bansho_media::{
+    exr,
+    files::{atomic, overwrite_policy::OverwritePolicy},
+};
 use half::f16;
 
 fn frame() -> Frame {
     let (width, height) = (37, 41);
     let count = width * height;
     let pixels = (0..count).map(|i| [i as f32 * 0.013, -0.7, 1.0 / (i + 1) as f32, 1.0e9]).collect();
-    let matrix = |start: f32| std::array::from_fn(|i| std::array::from_fn(|j| start + (4 * i + j) as f32));
+    let matrix = |start: f64| std::array::from_fn(|i| std::array::from_fn(|j| start + 1e-9 + (4 * i + j) as f64));
     let values = |scale: f32| (0..count).map(|i| i as f32 * scale).collect::<Vec<_>>();
     let channel = |name: &str, precision, scale| Channel { name: name.to_owned(), precision, values: values(scale) };
     let header = FrameHeader {
@@ -81,7 +84,7 @@ fn facts_by_openexr(path: &Path) -> (BTreeMap<String, String>, BTreeMap<String, 
 fn openexr_reads_every_channel_and_attribute() {
     let folder = tempfile::tempdir().unwrap();
     let (path, frame) = (folder.path().join("a.exr"), frame());
-    atomic::write_bytes(&path, &exr::encode(&frame, &path).unwrap()).unwrap();
+    atomic::write_bytes(&path, &exr::encode(&frame, &path).unwrap(), &OverwritePolicy::default()).unwrap();
     let (header, channels) = facts_by_openexr(&path);
 
     let half = |value: f32| f16::from_f32(value.clamp(-65504.0, 65504.0)).to_f32();
@@ -122,6 +125,8 @@ fn check_header(header: &BTreeMap<String, String>) {
     has("chromaticities", "0.32168");
     has("worldToCamera", "15.0");
     has("worldToNDC", "65.0");
+    has("bansho:worldToCamera", "15.000000001");
+    has("bansho:worldToNDC", "50.000000001");
     has("bansho:lens", "perspective");
     has("bansho:fisheyeFovDeg", "180.0");
     has("colorInteropID", "lin_ap1_scene");

@@ -8,7 +8,7 @@ use std::{
 
 use bansho_base::{
     color::AlphaConvention,
-    frame::{DisplayImage, DisplayPixels},
+    frame::{DisplayEncoding, DisplayImage, DisplayPixels},
 };
 use bansho_media::{
     MediaError,
@@ -16,10 +16,23 @@ use bansho_media::{
     film::ffmpeg::{VideoOptions, WebmCodec},
     format::{OutputKind, PictureFormat},
     output::{
-        resume::existing_fingerprint,
-        sink::{FrameSlot, Picture, Sink, SinkOptions},
+        frame_file::existing_fingerprint,
+        sink::{FinishedPicture, FrameSlot, Sink, SinkOptions},
     },
 };
+
+#[test]
+fn films_refuse_light_that_they_cannot_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, taken) in [("a.gif", false), ("a.apng", true)] {
+        let pattern = OutputPattern::parse(&folder.path().join(name), 2).unwrap();
+        let sink = Sink::open(pattern, SinkOptions::new([4, 3], [30, 1], 2)).unwrap();
+        let raw = DisplayImage { encoding: DisplayEncoding::LinearAcescg, ..picture(4, 3, 0) };
+        let written = sink.write(FrameSlot { index: 0, number: 0 }, FinishedPicture::Display(&raw, &[0; 32]));
+        assert_eq!(written.is_ok(), taken, "{name}: {written:?}");
+        assert!(taken || matches!(written, Err(MediaError::NotSrgb { .. })));
+    }
+}
 
 /// Smooth colors with a soft alpha that move a little each frame.
 fn picture(width: usize, height: usize, frame: usize) -> DisplayImage {
@@ -28,7 +41,14 @@ fn picture(width: usize, height: usize, frame: usize) -> DisplayImage {
         [(255 * x / width) as u8, (200 * y / height) as u8, (40 + frame * 10) as u8, (255 - 200 * y / height) as u8]
     };
     let pixels = DisplayPixels::Eight((0..width * height).map(pixel).collect());
-    DisplayImage { width, height, opaque: false, alpha: AlphaConvention::Linear, pixels }
+    DisplayImage {
+        width,
+        height,
+        opaque: false,
+        alpha: AlphaConvention::Linear,
+        encoding: DisplayEncoding::Srgb,
+        pixels,
+    }
 }
 
 fn open(folder: &Path, name: &str, frames: usize, options: impl FnOnce(&mut SinkOptions)) -> Result<Sink, MediaError> {
@@ -40,7 +60,7 @@ fn open(folder: &Path, name: &str, frames: usize, options: impl FnOnce(&mut Sink
 
 fn write(sink: &Sink, index: usize) -> Result<(), MediaError> {
     let slot = FrameSlot { index, number: index as i64 + 1001 };
-    sink.write(slot, Picture::Display(&picture(65, 67, index), &[index as u8; 32]))
+    sink.write(slot, FinishedPicture::Display(&picture(65, 67, index), &[index as u8; 32]))
 }
 
 fn names(folder: &Path) -> Vec<String> {
@@ -259,10 +279,18 @@ fn a_full_disk_is_said_and_leaves_whole_frames_only() {
     let noise =
         |i: usize| ((i as u32).wrapping_mul(0x9E37_79B9) ^ (i as u32 >> 3).wrapping_mul(0x85EB_CA6B)).to_le_bytes();
     let pixels = DisplayPixels::Eight((0..65 * 67).map(noise).collect());
-    let image = DisplayImage { width: 65, height: 67, opaque: false, alpha: AlphaConvention::Linear, pixels };
+    let image = DisplayImage {
+        width: 65,
+        height: 67,
+        opaque: false,
+        alpha: AlphaConvention::Linear,
+        encoding: DisplayEncoding::Srgb,
+        pixels,
+    };
     for name in ["f.png", "f.apng", "f.gif"] {
         let sink = open(disk.0.path(), name, 40, |_| {}).unwrap();
-        let write = |index| sink.write(FrameSlot { index, number: index as i64 }, Picture::Display(&image, &[1; 32]));
+        let write =
+            |index| sink.write(FrameSlot { index, number: index as i64 }, FinishedPicture::Display(&image, &[1; 32]));
         let failed = (0..40).find_map(|index| write(index).err()).or_else(|| sink.finish().err());
         assert!(matches!(failed, Some(MediaError::DiskFull { .. })), "{name}: {failed:?}");
         let left = names(disk.0.path());

@@ -69,6 +69,23 @@ fn draw_frame(rain: &Rain, view: &View, surroundings: &Surroundings) {
     });
 }
 
+/// What gusts cost: streaks are prepared in a steady wind and in one with gusts, by one thread.
+fn gusts(criterion: &mut Criterion) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let rain = rain(Method::Billboards, 20.0, 10.0, 0.0);
+    let mut group = criterion.benchmark_group("rain prepared, 20 mm/h to 10 m");
+    group.sample_size(20);
+    for (name, gust) in [("steady wind", 0.0), ("gusts", 0.4)] {
+        let velocity = Animated::from([3.0, 0.0, 1.0]);
+        let wind = Wind::new(WindParameters { velocity, gust, ..WindParameters::default() }, 1, None);
+        let (view, surroundings) = (view(), surroundings(&wind));
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| pool.install(|| black_box(rain.prepare(&view, &surroundings, &Unobserved).is_ok())));
+        });
+    }
+    group.finish();
+}
+
 /// Streaks at random positions in the picture, as long and wide as those of a real frame.
 fn naive(count: u64, pixels: &mut [[f32; 4]]) {
     let key = Key::new(1, "naive");
@@ -103,8 +120,8 @@ fn frames(criterion: &mut Criterion) {
     group.sample_size(20);
     let cases = [
         ("billboards, 20 mm/h to 5 m", rain(Method::Billboards, 20.0, 5.0, 0.0)),
-        ("billboards and veil, 20 mm/h to 5 m", rain(Method::Billboards, 20.0, 5.0, 100.0)),
-        ("billboards and veil, 100 mm/h to 50 m", rain(Method::Billboards, 100.0, 5.0, 45.0)),
+        ("billboards and airlight, 20 mm/h to 5 m", rain(Method::Billboards, 20.0, 5.0, 100.0)),
+        ("billboards and airlight, 100 mm/h to 50 m", rain(Method::Billboards, 100.0, 5.0, 45.0)),
         ("drops, 20 mm/h to 5 m", rain(Method::Drops, 20.0, 5.0, 0.0)),
         ("drops, 150,000 streaks", rain(Method::Drops, 100.0, 7.5, 0.0)),
     ];
@@ -138,5 +155,5 @@ fn frames(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, frames);
+criterion_group!(benches, gusts, frames);
 criterion_main!(benches);

@@ -36,14 +36,15 @@
 //! | phase function | p: light that a drop scatters by angle | [`DropPhaseFunction::phase`](lighting::drop_phase_function::DropPhaseFunction::phase) |
 //! | sky light through a drop | integral of `p L` over the sky | [`DropPhaseFunction::mean_radiance`](lighting::drop_phase_function::DropPhaseFunction::mean_radiance) |
 //! | single scattering | `integral of beta E p / (4 pi) e^-tau ds` along the line of sight | `lighting::equiangular::SightLineIntegrator::add_lamp` |
-//! | gust displacement | `integral of g(s) (1 - s / memory) ds`: displacement of drops by gusts | `drops::gust::displacement` |
+//! | gust displacement | `integral of g(s) (1 - s / memory) ds`: displacement of drops by gusts | `drops::gust::GustHistory::add_weights` |
 //!
 //! # Data flow
 //! 1. [`Rain::new`] divides [`RainParameters`]' diameters into bins. Terminal velocities follow each frame from the scene's air.
 //! 2. For a frame, `shutter_cameras` holds the cameras when the shutter opens, at its middle and when it closes, and `drops::shutter_state` the state of
 //!    the rain: a `lattice` of cells for each diameter, displaced by the wind, with `gust`s on top.
 //! 3. `lighting` prepares lamps, the sky through drops at the corners of a tile grid, and single scattering along lines of sight.
-//! 4. `streaks::project` visits the visible cells, nearest first, and turns batches of sixteen drops (`streaks::project_lanes`) into lit streaks. On
+//! 4. `streaks::project` visits the visible cells, nearest first, and turns batches of sixteen drops (`streaks::project_lanes`, of a fisheye or a panorama
+//!    `streaks::project_curvilinear`) into lit streaks; a long exposure is drawn in parts (`render::exposure_parts`). On
 //!    [`billboards`], drops come from the positions of a streak texture; on the ground `streaks::splashes` adds droplets. With `method = "textures"`,
 //!    [`textured_billboards`] draws the paper's textures instead. [`Rain::drops`] lists the drops as data.
 //! 5. `streaks::bin` sorts packed streaks into tiles of 128 x 8 pixels, in chunks.

@@ -8,28 +8,36 @@ use bansho_base::{
     parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run,
-        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{Emitter, Light, OtherPhenomena, Publication, Surroundings},
     },
+    tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
 use super::{model::Rain, parameters::RainParameters};
 use crate::{aovs::AOVS, raindrop, render::prepared::PreparedRain};
 
-impl Describe for RainParameters {
-    const KEY: &'static str = "rain";
-    const FIRST_KEYS: &'static [&'static str] =
-        &["rate_mm_per_h", "distance", "airlight_distance", "splashes.fraction"];
-    // Lamps at dusk along a wet street: drops only scatter the light of others.
-    const SCENE_DEFAULTS: &'static str = "\
+impl RainParameters {
+    /// The table `[[rain]]`.
+    pub const KIND: TableKind = TableKind {
+        first_keys: &["rate_mm_per_h", "distance", "airlight_distance", "splashes.fraction"],
+        // Lamps at dusk along a wet street: drops only scatter the light of others.
+        scene_defaults: "\
         camera = { position = [0.4, 1.3, 4.2], target = [0.0, 1.25, 0.0], vertical_fov_deg = 34.0 }\n\
         sky = { luminance = 0.12, temperature_k = 10000.0 }\n\
         ground = { wetness = 0.9, puddles = 0.4 }\n\
         light = [\
         { visible = true, position = [-1.3, 2.3, -1.5], intensity = 120.0, color = [1.0, 0.68, 0.36] }, \
         { visible = true, position = [2.4, 2.3, -9.0], intensity = 120.0, color = [1.0, 0.68, 0.36] }, \
-        { visible = true, position = [-4.6, 2.3, -17.0], intensity = 120.0, color = [1.0, 0.68, 0.36] }]\n";
+        { visible = true, position = [-4.6, 2.3, -17.0], intensity = 120.0, color = [1.0, 0.68, 0.36] }]\n",
+        ..TableKind::phenomenon::<Self>("rain")
+    };
+}
+
+impl PhenomenonTable for RainParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         match Rain::new(self.clone(), context.name, context.seed, context.loop_s) {
@@ -45,9 +53,9 @@ impl Phenomenon for Rain {
         PhenomenonInfo { aovs: AOVS, strengthened_by, ..PhenomenonInfo::new(&self.name) }
     }
 
-    fn memory_bytes(&self, _pixels: f64) -> f64 {
-        // Measured: streak textures, cells and tiles.
-        3e7
+    fn memory_bytes(&self, pixels: f64) -> f64 {
+        // Measured: what is fixed, and the streaks, cells and tiles of the picture.
+        4e5 + 4.5 * pixels
     }
 
     /// Rain emits no light.
@@ -101,6 +109,6 @@ impl Run for Rain {
 
     /// [`Rain::drops`], with their diameters and opacities.
     fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
-        Some(raindrop::point_cloud(&self.drops(view, surroundings)))
+        Some(raindrop::point_cloud(&self.drops(view, surroundings), view.export_origin))
     }
 }

@@ -12,7 +12,7 @@ use fearless_simd::dispatch;
 use crate::{
     Rain,
     drops::{
-        lattice::{CELL_SIZE, Cell},
+        lattice::{CELL_SIZE, LatticeCell},
         shutter_state::{DropClassState, ShutterState},
     },
     streaks::{
@@ -24,12 +24,13 @@ use crate::{
 
 /// A drop that is drawn as a streak of its own in one exposure.
 ///
-/// While the shutter is open it moves in a straight line along [`path`](Self::path) at the constant [`velocity`](Self::velocity).
+/// Its [`velocity`](Self::velocity) is the time derivative of its [`position`](Self::position), gusts included. While the shutter is open it is drawn along the
+/// straight line between the ends of its [`path`](Self::path), where it is at those times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Raindrop {
     /// Its center at the middle of the exposure, m, world coordinates. Below the ground for a drop that has landed by then.
     pub position: DVec3,
-    /// Its velocity, m/s: terminal velocity, wind and gusts.
+    /// Its velocity at the middle of the exposure, m/s: terminal velocity, wind and gusts.
     pub velocity: DVec3,
     /// Its center when the shutter opens, and when it closes or the drop lands, m, world coordinates.
     pub path: [DVec3; 2],
@@ -113,13 +114,13 @@ impl Rain {
 
 /// Adds the visible drops of a cell.
 #[inline(always)]
-fn add_cell(shutter_state: &ShutterState, class: &DropClassState, cell: Cell, drops: &mut Vec<Raindrop>) {
+fn add_cell(shutter_state: &ShutterState, class: &DropClassState, cell: LatticeCell, drops: &mut Vec<Raindrop>) {
     let of_cell = CellDrops::new(shutter_state, class, cell);
     for first in (0..of_cell.count()).step_by(LANES) {
         let batch = of_cell.batch(first);
         let streaks = DropSelection::All.visible_streaks(shutter_state, &batch);
-        if streaks.streaks.any_visible() {
-            let visible = (0..LANES).filter(|i| streaks.streaks.visible[*i] != 0);
+        if streaks.any() {
+            let visible = (0..LANES).filter(|i| streaks.is_seen(*i, &shutter_state.cameras));
             drops.extend(visible.map(|i| raindrop(shutter_state, &batch, &streaks, i)));
         }
     }
@@ -147,15 +148,12 @@ fn raindrop(shutter_state: &ShutterState, batch: &DropBatch, streaks: &VisibleSt
 }
 
 /// Drops as points for export.
-pub(crate) fn point_cloud(drops: &[Raindrop]) -> PointCloud {
-    let single = |value: DVec3| value.as_vec3().to_array();
+pub(crate) fn point_cloud(drops: &[Raindrop], origin: [f64; 3]) -> PointCloud {
     let quantity = |value: fn(&Raindrop) -> f64| drops.iter().map(|drop| value(drop) as f32).collect::<Vec<f32>>();
-    PointCloud {
-        positions: drops.iter().map(|drop| single(drop.position)).collect(),
-        velocities: drops.iter().map(|drop| single(drop.velocity)).collect(),
-        quantities: BTreeMap::from([
-            (Quantity::DiameterMm, quantity(|drop| drop.diameter_mm)),
-            (Quantity::Opacity, quantity(|drop| drop.opacity)),
-        ]),
-    }
+    let quantities = BTreeMap::from([
+        (Quantity::DiameterMm, quantity(|drop| drop.diameter_mm)),
+        (Quantity::Opacity, quantity(|drop| drop.opacity)),
+    ]);
+    let velocities = drops.iter().map(|drop| drop.velocity.as_vec3().to_array()).collect();
+    PointCloud::new(origin, drops.iter().map(|drop| drop.position.to_array()), velocities, quantities)
 }

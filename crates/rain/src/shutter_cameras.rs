@@ -4,11 +4,11 @@
 use bansho_base::{
     camera::{Camera, Lens},
     image::Rect,
-    math::{DVec2, DVec3, MulAdd, simd::LANES},
+    math::{DVec3, MulAdd, simd::LANES},
     phenomenon::strip::View,
 };
 
-use crate::lanes::{Lanes, Vec3Lanes, ZERO_LANES};
+use crate::lanes::{LaneArray, Vec3Lanes, ZERO_LANES};
 
 /// Bounding box in the picture: columns and rows `[low, high]`, pixels. It may extend beyond the picture.
 pub(crate) type PixelBounds = [[f32; 2]; 2];
@@ -19,15 +19,24 @@ pub(crate) const PUPIL_RADIUS: f32 = 4e-3;
 /// Largest radius at which a drop is visible around its center, m: that of the largest drop and its defocus blur.
 pub(crate) const MAX_DROP_RADIUS: f64 = 4e-3 + PUPIL_RADIUS as f64;
 
+/// Steps of the exposure at whose ends the cameras of lenses are known that bend straight lines.
+pub(crate) const PATH_STEPS: usize = 16;
+
 /// The cameras of one exposure.
 #[derive(Clone, Debug)]
 pub(crate) struct ShutterCameras {
     /// When the shutter opens, at the middle of the exposure, and when it closes.
     pub(crate) cameras: [Camera; 3],
+    /// Those at the beginnings and ends of [`PATH_STEPS`] equal parts of the exposure, of a fisheye or a panorama that moves.
+    during_exposure: Vec<Camera>,
     /// The same cameras, for sixteen points at a time.
     pub(crate) projectors: [Projector; 3],
+    /// Columns and rows of the picture: whole pixels, of which a camera with larger pixels may see a part of the last.
+    size: [usize; 2],
     /// Columns and rows of the crop window, pixels.
     pub(crate) window: PixelBounds,
+    /// Pixels after which a panorama repeats.
+    pub(crate) period: Option<f32>,
     /// Duration of the exposure, s.
     pub(crate) exposure_time: f64,
     /// View frusta of the crop window; empty for lenses that see all around.
@@ -37,9 +46,6 @@ pub(crate) struct ShutterCameras {
 /// Projects sixteen points at a time.
 #[derive(Clone, Debug)]
 pub(crate) struct Projector {
-    camera: Camera,
-    /// Origin of the points' coordinates, m.
-    origin: DVec3,
     /// The camera's axes: right, up and backward.
     axes: [[f32; 3]; 3],
     /// The origin in camera coordinates, m.
@@ -52,12 +58,12 @@ pub(crate) struct Projector {
 /// Sixteen points projected into the picture.
 pub(crate) struct ProjectedPoints {
     /// Pixels; NaN where the lens does not see the point.
-    pub(crate) x: Lanes,
-    pub(crate) y: Lanes,
+    pub(crate) x: LaneArray,
+    pub(crate) y: LaneArray,
     /// Depth by the lens's definition, m.
-    pub(crate) depth: Lanes,
+    pub(crate) depth: LaneArray,
     /// Pixels for one meter perpendicular to the line of sight.
-    pub(crate) scale: Lanes,
+    pub(crate) scale: LaneArray,
 }
 
 impl Projector {
@@ -69,27 +75,12 @@ impl Projector {
             center: camera.principal_point.as_vec2().to_array(),
             focal: camera.focal_pixels as f32,
             near: camera.near as f32,
-            camera,
-            origin,
         }
     }
 
+    /// [`Camera::project`] of a perspective lens in single precision.
     #[inline(always)]
-    pub(crate) fn lens(&self) -> Lens {
-        self.camera.lens
-    }
-
-    #[inline(always)]
-    pub(crate) fn project(&self, points: &Vec3Lanes) -> ProjectedPoints {
-        match self.camera.lens {
-            Lens::Perspective => self.project_perspective(points),
-            Lens::Fisheye | Lens::Panorama => self.project_curvilinear(points),
-        }
-    }
-
-    /// [`Camera::project`] in single precision.
-    #[inline(always)]
-    fn project_perspective(&self, [xs, ys, zs]: &Vec3Lanes) -> ProjectedPoints {
+    pub(crate) fn project(&self, [xs, ys, zs]: &Vec3Lanes) -> ProjectedPoints {
         let mut points = ProjectedPoints { x: ZERO_LANES, y: ZERO_LANES, depth: ZERO_LANES, scale: ZERO_LANES };
         let [right, up, back] = &self.axes;
         for i in 0..LANES {
@@ -102,20 +93,6 @@ impl Projector {
             points.x[i] = across.fma(scale, self.center[0]);
             points.y[i] = self.center[1] - above * scale;
             (points.depth[i], points.scale[i]) = (depth, scale);
-        }
-        points
-    }
-
-    fn project_curvilinear(&self, [xs, ys, zs]: &Vec3Lanes) -> ProjectedPoints {
-        const NOT_VISIBLE: Lanes = [f32::NAN; LANES];
-        let mut points = ProjectedPoints { x: NOT_VISIBLE, y: NOT_VISIBLE, depth: NOT_VISIBLE, scale: NOT_VISIBLE };
-        for i in 0..LANES {
-            let point = self.origin + DVec3::new(xs[i].into(), ys[i].into(), zs[i].into());
-            if let Some(projection) = self.camera.project(point) {
-                let DVec2 { x, y } = projection.pixel;
-                (points.x[i], points.y[i]) = (x as f32, y as f32);
-                (points.depth[i], points.scale[i]) = (projection.depth as f32, projection.pixels_per_meter as f32);
-            }
         }
         points
     }
@@ -193,7 +170,20 @@ impl ShutterCameras {
         let window = &view.window;
         let window =
             [[window.x, window.right()], [window.y, window.bottom()]].map(|sides| sides.map(|side| side as f32));
-        Self { cameras, projectors, window, exposure_time: shutter.duration(), frusta }
+        let is_moving = view.camera.lens != Lens::Perspective && distinct.len() > 1;
+        let time = |step: usize| shutter.open + shutter.duration() * (step as f64 / PATH_STEPS as f64);
+        let during_exposure =
+            if is_moving { (0..=PATH_STEPS).map(|step| view.camera_at(time(step))).collect() } else { Vec::new() };
+        Self {
+            cameras,
+            during_exposure,
+            projectors,
+            size: view.size,
+            window,
+            period: view.camera.horizontal_period().map(|period| period as f32),
+            exposure_time: shutter.duration(),
+            frusta,
+        }
     }
 
     /// The camera at the middle of the exposure.
@@ -201,9 +191,14 @@ impl ShutterCameras {
         &self.cameras[1]
     }
 
+    /// The camera after a number of [`PATH_STEPS`] of the exposure, of a fisheye or a panorama.
+    pub(crate) fn during_exposure(&self, step: usize) -> &Camera {
+        self.during_exposure.get(step).unwrap_or(&self.cameras[1])
+    }
+
     /// Columns and rows of the picture.
     pub(crate) fn size(&self) -> [usize; 2] {
-        self.cameras[1].size.map(|side| side as usize)
+        self.size
     }
 
     /// Velocity of the camera's position during the exposure, m/s.
@@ -243,6 +238,15 @@ mod tests {
     };
 
     use super::*;
+
+    #[test]
+    fn the_picture_of_a_mirrored_view_has_all_of_its_pixels() {
+        let shutter = Shutter { open: 0.0, close: 0.02 };
+        for (size, halved) in [([64, 1], [32, 1]), ([1, 1], [1, 1]), ([17, 11], [9, 6]), ([16, 17], [8, 9])] {
+            let view = View::new(CameraParameters::default(), shutter, 0.03, size, 0).with_pixel_size(2);
+            assert_eq!((view.size, ShutterCameras::new(&view).size()), (halved, halved), "half of {size:?}");
+        }
+    }
 
     #[test]
     fn whatever_projects_into_the_picture_may_be_seen() {

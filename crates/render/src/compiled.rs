@@ -3,37 +3,34 @@
 use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use bansho_base::{
+    color::View,
     host::assets::{Assets, Picture, PictureAlpha},
     parameters::{BuildError, Reader},
-    phenomenon::{
-        Phenomenon, PhenomenonInfo, Run, Stepped, Stepping, kind::BuildContext, strip::Shutter, surroundings::Occluder,
-    },
-    world::{obstacle::Obstacle, wind::Wind},
-};
-use bansho_environment::{
-    ground::Ground,
-    lamps::{Lamp, Lamps},
-    sky::SkyBackdrop,
-    solids::Solids,
+    phenomenon::{Phenomenon, PhenomenonInfo, Run, Stepped, Stepping, strip::Shutter, surroundings::Occluder},
+    tables::{BuildContext, BuiltTable, SharedRole},
+    world::wind::Wind,
 };
 
 use crate::{
     crossfade::CrossfadeRun,
     fingerprint::{self, Fingerprint},
+    plate_boxes::{PlateBoxes, PlateBoxesCache, PlateBoxesKey},
 };
-use bansho_scene::{Instance, Scene, SceneError};
+use bansho_scene::{Instance, Scene, SceneError, SharedInstance};
 
-/// A scene whose phenomena, obstacles and distance fields are built.
+/// A scene whose phenomena and shared tables are built.
 #[derive(Clone)]
 pub struct CompiledScene {
     scene: Arc<Scene>,
     assets: Arc<dyn Assets>,
     wind: Wind,
-    obstacles: Vec<(Fingerprint, Obstacle)>,
+    /// Its shared tables, in the order of the scene.
+    shared: Vec<BuiltShared>,
     /// Every phenomenon of the scene, including disabled ones, by the fingerprint of what it was built from.
     built: BTreeMap<Fingerprint, Arc<dyn Phenomenon>>,
-    /// The enabled phenomena in the order of the scene, then its lamps, visible obstacles, ground and sky.
+    /// The enabled phenomena in the order of the scene, then those that draw its shared tables.
     enabled: Vec<BuiltPhenomenon>,
+    plate_boxes: Arc<PlateBoxesCache>,
 }
 
 /// A phenomenon, with the fingerprint of all that it was built from.
@@ -41,6 +38,14 @@ pub struct CompiledScene {
 pub(crate) struct BuiltPhenomenon {
     pub(crate) fingerprint: Fingerprint,
     pub(crate) phenomenon: Arc<dyn Phenomenon>,
+}
+
+/// A shared table that is built, with the fingerprint of all that it was built from.
+#[derive(Clone)]
+struct BuiltShared {
+    fingerprint: Fingerprint,
+    instance: SharedInstance,
+    table: BuiltTable,
 }
 
 /// Errors that only building finds, each with the dotted path of the table that it is about.
@@ -95,7 +100,7 @@ impl CompiledScene {
         {
             errors.push(("plate".to_owned(), error));
         }
-        let obstacles = build_obstacles(&scene, assets.as_ref(), previous, &mut errors);
+        let shared = build_shared(&scene, assets.as_ref(), previous, &mut errors);
         let (built, fingerprints) = build_instances(&scene, assets.as_ref(), previous, &mut errors);
         if !errors.is_empty() {
             return Err(BuildErrors(errors));
@@ -103,14 +108,27 @@ impl CompiledScene {
         let phenomena = fingerprints.into_iter().filter_map(|fingerprint| {
             Some(BuiltPhenomenon { fingerprint, phenomenon: built.get(&fingerprint)?.clone() })
         });
-        let enabled = phenomena.chain(backdrop(&scene, assets.as_ref(), &obstacles, previous)).collect();
+        let enabled = phenomena.chain(drawn_tables(&scene, assets.as_ref(), &shared, previous)).collect();
         let wind = Wind::new(scene.wind.clone(), scene.seed, scene.loop_s);
-        Ok(Self { wind, obstacles, built, enabled, scene, assets })
+        let plate_boxes = previous.map(|previous| previous.plate_boxes.clone()).unwrap_or_default();
+        Ok(Self { wind, shared, built, enabled, scene, assets, plate_boxes })
     }
 
     /// The image of the plate in the first frame; `None` without a plate, or if it cannot be read.
     pub fn plate_image(&self) -> Option<Arc<Picture>> {
         plate_image(&self.scene, self.assets.as_ref())
+    }
+
+    /// The light of the plate in the first frame, computed once for each picture; `None` without a plate, or if it cannot be read.
+    pub(crate) fn plate_boxes(&self, view: View) -> Option<Arc<PlateBoxes>> {
+        let (picture, plate) = (self.plate_image()?, &self.scene.plate);
+        let alpha = plate.alpha_of(&picture);
+        let compute = || PlateBoxes::new(&picture, alpha, &view);
+        let path = plate.image.as_ref()?;
+        Some(match self.assets.digest(&path.0, self.scene.picture.first_frame) {
+            Ok(digest) => self.plate_boxes.get_or_compute(PlateBoxesKey { digest, alpha, view }, compute),
+            Err(_) => Arc::new(compute()),
+        })
     }
 
     /// Whether the plate covers the picture: it has one, whose image is opaque in the first frame.
@@ -159,12 +177,12 @@ impl CompiledScene {
         &self.wind
     }
 
-    /// Its obstacles at time `t`.
-    pub fn obstacles(&self, t: f64) -> impl Iterator<Item = Occluder> {
-        self.obstacles.iter().map(move |(_, obstacle)| obstacle.at(t))
+    /// The solids of its shared tables at time `t`.
+    pub fn solids(&self, t: f64) -> impl Iterator<Item = Occluder> {
+        self.shared.iter().filter_map(move |built| built.table.object.as_ref()?.solid(t))
     }
 
-    /// Its enabled phenomena, then its lamps, visible obstacles, ground and sky.
+    /// Its enabled phenomena, then those that draw its shared tables.
     pub fn phenomena(&self) -> impl Iterator<Item = &Arc<dyn Phenomenon>> {
         self.enabled.iter().map(|built| &built.phenomenon)
     }
@@ -246,28 +264,34 @@ impl ActiveRun {
     }
 }
 
-fn build_obstacles(
+fn build_shared(
     scene: &Scene,
     assets: &dyn Assets,
     previous: Option<&CompiledScene>,
     errors: &mut Vec<(String, BuildError)>,
-) -> Vec<(Fingerprint, Obstacle)> {
-    let mut obstacles = Vec::new();
-    for (index, obstacle) in scene.obstacles.iter().enumerate() {
+) -> Vec<BuiltShared> {
+    let mut shared = Vec::new();
+    for (path, instance) in scene.tables.with_paths() {
         // Fingerprinting reads every file that a mesh names, whatever their total size, whereas building refuses too many bytes. So only
         // what has been built, now or in `previous`, is fingerprinted.
-        let fingerprint = || fingerprint::of_obstacle(obstacle, scene, assets);
-        let candidate = previous.filter(|previous| previous.scene.obstacles.contains(obstacle));
-        let known = candidate.and_then(|previous| {
+        let fingerprint = || fingerprint::of_shared(instance, scene, assets);
+        let is_equal = |known: &&BuiltShared| known.instance.parameters.equals(instance.parameters.as_ref());
+        let candidate = previous.and_then(|previous| previous.shared.iter().find(is_equal));
+        let known = candidate.and_then(|_| {
             let fingerprint = fingerprint();
-            previous.obstacles.iter().find(|(known, _)| *known == fingerprint).cloned()
+            previous?.shared.iter().find(|known| known.fingerprint == fingerprint).cloned()
         });
-        match known.map_or_else(|| obstacle.build(assets).map(|occluder| (fingerprint(), occluder)), Ok) {
-            Ok(obstacle) => obstacles.push(obstacle),
-            Err(error) => errors.push((format!("obstacle.{index}"), error)),
+        let build = || {
+            let object = instance.parameters.build(assets)?;
+            let table = BuiltTable { parameters: instance.parameters.clone(), object };
+            Ok(BuiltShared { fingerprint: fingerprint(), instance: instance.clone(), table })
+        };
+        match known.map_or_else(build, Ok) {
+            Ok(built) => shared.push(built),
+            Err(error) => errors.push((path, error)),
         }
     }
-    obstacles
+    shared
 }
 
 /// Every phenomenon by its fingerprint, and the fingerprints of the enabled ones in the order of the scene.
@@ -319,7 +343,7 @@ fn build_instance(
     previous: Option<&dyn Phenomenon>,
 ) -> Result<Arc<dyn Phenomenon>, BuildError> {
     let context = BuildContext { name: &instance.name, seed: scene.seed, loop_s: scene.loop_s, assets, previous };
-    instance.parameters.build(&context)
+    instance.parameters.build_in_loop(&context)
 }
 
 /// The image of the plate in the first frame; `None` without a plate, or if it cannot be read.
@@ -331,40 +355,32 @@ fn is_opaque(picture: Arc<Picture>) -> bool {
     picture.alpha == PictureAlpha::Opaque
 }
 
-/// The scene's visible lamps and obstacles, its ground, and its visible sky unless there is a plate that is opaque in the first frame.
-fn backdrop(
+/// The phenomena that draw the visible shared tables, one for each kind. What is behind plates is left out if the plate is opaque in the first frame.
+fn drawn_tables(
     scene: &Scene,
     assets: &dyn Assets,
-    obstacles: &[(Fingerprint, Obstacle)],
+    shared: &[BuiltShared],
     previous: Option<&CompiledScene>,
 ) -> Vec<BuiltPhenomenon> {
-    let mut backdrop = Vec::new();
-    let mut add = |fingerprint: Fingerprint, build: &dyn Fn() -> Arc<dyn Phenomenon>| {
+    let mut visible: Vec<&BuiltShared> = shared.iter().filter(|built| built.table.parameters.is_visible()).collect();
+    visible.sort_by_key(|built| built.instance.kind.shared_role().map(|role| role.draw_order));
+    let mut drawn = Vec::new();
+    for tables in visible.chunk_by(|a, b| a.instance.kind.key == b.instance.kind.key) {
+        let kind = tables[0].instance.kind;
+        let Some(SharedRole { draw: Some(draw), is_behind_plates, .. }) = kind.shared_role() else { continue };
+        if *is_behind_plates && scene.has_plate() && plate_image(scene, assets).is_none_or(is_opaque) {
+            continue;
+        }
+        let fingerprints: Vec<Fingerprint> = tables.iter().map(|built| built.fingerprint).collect();
+        let fingerprint = fingerprint::of_drawn(kind.key, &fingerprints, scene);
         let known = previous
             .and_then(|previous| previous.enabled.iter().find(|built| built.fingerprint == fingerprint).cloned());
-        backdrop.push(known.unwrap_or_else(|| BuiltPhenomenon { fingerprint, phenomenon: build() }));
-    };
-    let visible: Vec<_> = scene.lights.iter().filter(|light| light.visible).cloned().collect();
-    if !visible.is_empty() {
-        add(fingerprint::of_lamps(&visible, scene), &|| {
-            let lights = visible.clone();
-            let at = move |t| lights.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect();
-            Arc::new(Lamps::new(at))
-        });
+        drawn.push(known.unwrap_or_else(|| {
+            let name = kind.layer.unwrap_or(kind.key);
+            let context = BuildContext { name, seed: scene.seed, loop_s: scene.loop_s, assets, previous: None };
+            let tables: Vec<BuiltTable> = tables.iter().map(|built| built.table.clone()).collect();
+            BuiltPhenomenon { fingerprint, phenomenon: draw(&tables, &context) }
+        }));
     }
-    let solid: Vec<_> = obstacles.iter().filter(|(_, obstacle)| Solids::draws(obstacle)).cloned().collect();
-    if !solid.is_empty() {
-        let fingerprints: Vec<Fingerprint> = solid.iter().map(|(fingerprint, _)| *fingerprint).collect();
-        add(fingerprint::of_solids(&fingerprints, scene), &|| {
-            Arc::new(Solids::new(solid.iter().map(|(_, obstacle)| obstacle.clone()).collect()))
-        });
-    }
-    if let Some(ground) = &scene.ground {
-        add(fingerprint::of_ground(ground, scene), &|| Arc::new(Ground::new(ground.clone(), scene.seed, scene.loop_s)));
-    }
-    let is_seen = || !scene.has_plate() || !plate_image(scene, assets).is_none_or(is_opaque);
-    if let Some(sky) = scene.sky.as_ref().filter(|sky| sky.visible && is_seen()) {
-        add(fingerprint::of_sky(sky, scene), &|| Arc::new(SkyBackdrop::new(sky.clone(), scene.seed)));
-    }
-    backdrop
+    drawn
 }

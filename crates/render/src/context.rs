@@ -36,8 +36,8 @@ impl ShotContext {
     /// The light of the sky at time `t`: the scene's own sky; without one, the light that the plate shows, which is as bright as the plate
     /// looks at the shot's exposure.
     pub(crate) fn sky(&self, t: f64) -> Sky {
-        if let Some(sky) = &self.scene().sky {
-            return sky.at(t);
+        if let Some(stated) = self.scene().tables.sky(t) {
+            return stated.sky;
         }
         let light = get_or_compute(&self.plate_light, || plate_light(&self.compiled, &self.plan));
         light.map_or(Sky::DARK, |light| Sky::measured(light.scaled(1.0 / self.plan.exposure_scale())))

@@ -139,10 +139,8 @@ impl Run for CrossfadeRun {
         if weight == 1.0 {
             return current;
         }
-        let offset = if shutter.middle() < 0.5 * self.period { self.period } else { -self.period };
-        let adjacent_shutter = Shutter { open: shutter.open + offset, close: shutter.close + offset };
         let mut both = scaled(current, weight);
-        both.extend(&scaled(self.adjacent.run.publish(adjacent_shutter), 1.0 - weight));
+        both.extend(&scaled(self.adjacent.run.publish(self.adjacent_shutter(shutter)), 1.0 - weight));
         both
     }
 
@@ -187,6 +185,25 @@ impl Stepped for CrossfadeRun {
         debug_assert_eq!(done, Ok(()), "a run restores the states of other runs of its phenomenon");
     }
 
+    /// The later of the time that its run wants and the middle of the exposure, at which both runs are drawn.
+    fn time_for(&self, shutter: Shutter) -> f64 {
+        self.current.run.as_stepped().map_or(0.0, |run| run.time_for(shutter)).max(shutter.middle())
+    }
+
+    fn begin_exposure(&mut self, shutter: Shutter) {
+        let adjacent_shutter = self.adjacent_shutter(shutter);
+        for (segment, shutter) in [(&mut self.current, shutter), (&mut self.adjacent, adjacent_shutter)] {
+            if let Some(stepped) = segment.run.as_stepped_mut() {
+                stepped.begin_exposure(shutter);
+            }
+        }
+    }
+
+    /// As its current run, which has no states before the loop begins.
+    fn keeps_states_for(&self, shutter: Shutter) -> bool {
+        shutter.open < 0.0 || self.current.run.as_stepped().is_none_or(|run| run.keeps_states_for(shutter))
+    }
+
     fn snapshot(&self) -> Vec<u8> {
         let (current, adjacent) = (self.current.snapshot(), self.adjacent.snapshot());
         let mut bytes = vec![u8::from(self.adjacent_is_next)];
@@ -213,6 +230,12 @@ impl Stepped for CrossfadeRun {
 }
 
 impl CrossfadeRun {
+    /// An exposure in the time of the adjacent run.
+    fn adjacent_shutter(&self, shutter: Shutter) -> Shutter {
+        let offset = if shutter.middle() < 0.5 * self.period { self.period } else { -self.period };
+        Shutter { open: shutter.open + offset, close: shutter.close + offset }
+    }
+
     /// The view of the adjacent run; `None` where its weight is 0.
     fn adjacent_view<'a>(&self, view: &'a View) -> Option<&'a View> {
         view.adjacent_loop_view.as_deref().filter(|_| self.current_weight(view.shutter.middle()) < 1.0)

@@ -2,7 +2,7 @@
 
 use bansho_base::{
     color::{AlphaConvention, AlphaMode, DisplayCode, View},
-    frame::{DisplayImage, DisplayPixels, Frame, FrameHeader, PhenomenonMetadata},
+    frame::{DisplayEncoding, DisplayImage, DisplayPixels, Frame, FrameHeader, PhenomenonMetadata},
     host::observer::Cancelled,
 };
 
@@ -61,7 +61,8 @@ impl DisplayFrame {
             BitDepth::Eight => DisplayPixels::Eight(drawn_codes(composition, &conversion)?),
             BitDepth::Sixteen => DisplayPixels::Sixteen(drawn_codes(composition, &conversion)?),
         };
-        let image = DisplayImage { width, height, opaque, alpha, pixels };
+        let encoding = encoding_in(&options.view);
+        let image = DisplayImage { width, height, opaque, alpha, encoding, pixels };
         Ok(Self { header, image, metadata: Vec::new() })
     }
 }
@@ -85,12 +86,18 @@ pub fn display(frame: &Frame, view: &View, depth: BitDepth, alpha: AlphaConventi
         BitDepth::Eight => DisplayPixels::Eight(codes(frame, view, alpha)),
         BitDepth::Sixteen => DisplayPixels::Sixteen(codes(frame, view, alpha)),
     };
-    DisplayImage { width: frame.beauty.width(), height: frame.beauty.height(), opaque: frame.opaque, alpha, pixels }
+    let (width, height) = (frame.beauty.width(), frame.beauty.height());
+    DisplayImage { width, height, opaque: frame.opaque, alpha, encoding: encoding_in(view), pixels }
 }
 
 /// The convention of alpha in this view: `raw` encodes nothing, so its alpha is linear.
 fn alpha_in(view: &View, alpha: AlphaConvention) -> AlphaConvention {
     if *view == View::RAW { AlphaConvention::Linear } else { alpha }
+}
+
+/// What the codes of this view stand for.
+fn encoding_in(view: &View) -> DisplayEncoding {
+    if *view == View::RAW { DisplayEncoding::LinearAcescg } else { DisplayEncoding::Srgb }
 }
 
 /// Display codes of the pixels, in rows.

@@ -7,11 +7,8 @@ use bansho_base::{
     color::{AlphaConvention, BitDepth},
     host::assets::Assets,
     parameters::{Parameters, Table, Value},
-    world::obstacle::ObstacleParameters,
-    world::sky::SkyParameters,
 };
-use bansho_environment::ground::GroundParameters;
-use bansho_scene::{Instance, LightParameters, Scene};
+use bansho_scene::{Instance, Scene, SharedInstance};
 
 /// A hash of everything that something depends on.
 pub type Fingerprint = [u8; 32];
@@ -39,7 +36,7 @@ fn seeded(scene: &Scene) -> blake3::Hasher {
 pub(crate) fn of_instance(own: &Instance, scene: &Scene, assets: &dyn Assets) -> Fingerprint {
     let mut hasher = seeded(scene);
     hash_instance(own, &mut hasher);
-    own.parameters.assets().iter().for_each(|path| hash_shared_asset(scene, assets, path, &mut hasher));
+    own.parameters.asset_paths().iter().for_each(|path| hash_shared_asset(scene, assets, path, &mut hasher));
     *hasher.finalize().as_bytes()
 }
 
@@ -53,40 +50,19 @@ pub(crate) fn of_revision(name: &str, revision: u64) -> Fingerprint {
         .as_bytes()
 }
 
-/// A fingerprint of all that an obstacle is built from.
-pub(crate) fn of_obstacle(obstacle: &ObstacleParameters, scene: &Scene, assets: &dyn Assets) -> Fingerprint {
+/// A fingerprint of all that a shared table is built from.
+pub(crate) fn of_shared(table: &SharedInstance, scene: &Scene, assets: &dyn Assets) -> Fingerprint {
     let mut hasher = blake3::Hasher::new();
-    hash_table("obstacle", obstacle.to_table(), &mut hasher);
-    obstacle.file.iter().for_each(|path| hash_shared_asset(scene, assets, &path.0, &mut hasher));
+    hash_table(table.kind.key, table.parameters.canonical(), &mut hasher);
+    table.parameters.asset_paths().iter().for_each(|path| hash_shared_asset(scene, assets, path, &mut hasher));
     *hasher.finalize().as_bytes()
 }
 
-/// A fingerprint of all that the visible lamps are built from.
-pub(crate) fn of_lamps(lights: &[LightParameters], scene: &Scene) -> Fingerprint {
+/// A fingerprint of all from which the phenomenon is built that draws the shared tables called `key`: theirs.
+pub(crate) fn of_drawn(key: &str, tables: &[Fingerprint], scene: &Scene) -> Fingerprint {
     let mut hasher = seeded(scene);
-    lights.iter().for_each(|light| hash_table("light", light.to_table(), &mut hasher));
-    *hasher.finalize().as_bytes()
-}
-
-/// A fingerprint of all that the visible obstacles are built from: theirs.
-pub(crate) fn of_solids(obstacles: &[Fingerprint], scene: &Scene) -> Fingerprint {
-    let mut hasher = seeded(scene);
-    hasher.update(b"solids");
-    obstacles.iter().for_each(|fingerprint| _ = hasher.update(fingerprint));
-    *hasher.finalize().as_bytes()
-}
-
-/// A fingerprint of all that the ground is built from.
-pub(crate) fn of_ground(ground: &GroundParameters, scene: &Scene) -> Fingerprint {
-    let mut hasher = seeded(scene);
-    hash_table("ground", ground.to_table(), &mut hasher);
-    *hasher.finalize().as_bytes()
-}
-
-/// A fingerprint of all that the sky as a backdrop is built from.
-pub(crate) fn of_sky(sky: &SkyParameters, scene: &Scene) -> Fingerprint {
-    let mut hasher = seeded(scene);
-    hash_table("sky", sky.to_table(), &mut hasher);
+    hasher.update(key.as_bytes());
+    tables.iter().for_each(|fingerprint| _ = hasher.update(fingerprint));
     *hasher.finalize().as_bytes()
 }
 
@@ -95,23 +71,16 @@ pub(crate) fn hash_state(scene: &Scene, assets: &dyn Assets, hasher: &mut blake3
     let seeded = format!("bansho {VERSION} seed {} loop {:?} wind", scene.seed, scene.loop_s);
     hash_table(&seeded, scene.wind.to_table(), hasher);
     hash_table("air", scene.air.to_table(), hasher);
-    for light in &scene.lights {
-        hash_table("light", light.to_table(), hasher);
-    }
-    if let Some(sky) = &scene.sky {
-        hash_table("sky", sky.to_table(), hasher);
-    }
-    if let Some(ground) = &scene.ground {
-        hash_table("ground", ground.to_table(), hasher);
-    }
-    for obstacle in &scene.obstacles {
-        hash_table("obstacle", obstacle.to_table(), hasher);
+    let mut shared: Vec<&SharedInstance> = scene.tables.iter().collect();
+    shared.sort_by_key(|table| table.kind.shared_role().map(|role| role.fingerprint_order));
+    for table in &shared {
+        hash_table(table.kind.key, table.parameters.canonical(), hasher);
     }
     let enabled = || scene.instances.iter().filter(|instance| instance.enabled);
     enabled().for_each(|own| hash_instance(own, hasher));
-    let obstacles = scene.obstacles.iter().filter_map(|obstacle| Some(obstacle.file.as_ref()?.0.clone()));
-    obstacles
-        .chain(enabled().flat_map(|own| own.parameters.assets()))
+    let files = shared.iter().flat_map(|table| table.parameters.asset_paths());
+    files
+        .chain(enabled().flat_map(|own| own.parameters.asset_paths()))
         .for_each(|path| hash_shared_asset(scene, assets, &path, hasher));
 }
 

@@ -8,11 +8,13 @@ mod composite;
 mod context;
 mod crossfade;
 pub mod display;
+mod exposure_parts;
 mod faint;
 pub mod fingerprint;
 pub mod pixels;
 pub mod plan;
 mod planning;
+mod plate_boxes;
 pub mod remarks;
 pub mod shot;
 
@@ -22,4 +24,4 @@ pub use pixels::{
     write_rgba32f,
 };
 pub use plan::{Plan, PlanError, PlanOptions};
-pub use shot::{PhenomenonLight, RenderError, Shot};
+pub use shot::{PhenomenonLight, RenderError, Shot, snapshot};

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    camera::CameraParameters,
+    camera::{Camera, CameraParameters},
     color,
     frame::FrameHeader,
     host::assets::Assets,
@@ -237,10 +237,17 @@ impl Plan {
         }
     }
 
-    /// Whence the plate of frame `number` was taken.
+    /// The camera at the middle of an exposure, on its side of every cut.
+    pub(crate) fn middle_camera(&self, shutter: Shutter) -> Camera {
+        let middle = shutter.middle();
+        self.camera.of_exposure(middle, self.fps().frame_s()).at(middle, self.size)
+    }
+
+    /// The view from which the plate of frame `number` was taken.
     pub(crate) fn plate_view(&self, number: i64) -> PlateView {
-        let camera = self.camera.at(self.shutter(number).middle(), self.size);
-        let ground_height = self.scene.ground.as_ref().map(|ground| ground.height);
+        let shutter = self.shutter(number);
+        let camera = self.middle_camera(shutter);
+        let ground_height = self.scene.tables.level_ground(shutter.middle()).map(|ground| ground.height);
         PlateView { camera, size: self.size, ground_height }
     }
 
@@ -287,7 +294,7 @@ impl Plan {
             white_balance_k: self.scene.picture.white_balance_k.map(|kelvin| kelvin as f32),
             fps: [self.fps().frames, self.fps().seconds],
             exposure_time_s: shutter.duration() as f32,
-            camera: self.camera.at(shutter.middle(), self.size).header(),
+            camera: self.middle_camera(shutter).header(),
             fingerprint,
             display_size: self.size,
             data_origin: [self.window.x as i64 - overscan, self.window.y as i64 - overscan],

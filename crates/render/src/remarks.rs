@@ -3,19 +3,21 @@
 use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
+    camera::turns::{SuddenTurn, sudden_turns},
     color,
     geometry::strokes::DrawingRemark,
-    host::once::get_or_compute,
+    host::{once::get_or_compute, parallel::prelude::*},
     phenomenon::{
-        Remark,
-        strip::Shutter,
-        surroundings::{OtherPhenomena, Publication},
+        Phenomenon, Remark,
+        strip::{Shutter, View},
+        surroundings::{OtherPhenomena, Publication, PublishedByAll},
     },
     world::sky::Sky,
 };
 
 use crate::{
     compiled::{ActiveRun, CompiledScene},
+    composite::plate_light_remark,
     context::ShotContext,
     faint::faint_phenomenon_remarks,
     plan::Plan,
@@ -29,8 +31,8 @@ struct ExposedScene<'a> {
     shutter: Shutter,
     runs: &'a [ActiveRun],
     scene: Publication,
-    /// What each phenomenon publishes, computed on first use.
-    published: Vec<OnceLock<Publication>>,
+    /// What all phenomena publish, computed on first use.
+    published: OnceLock<PublishedByAll>,
     sky: Sky,
 }
 
@@ -40,17 +42,15 @@ impl<'a> ExposedScene<'a> {
             shutter,
             runs,
             scene: scene_publication(context, shutter),
-            published: runs.iter().map(|_| OnceLock::new()).collect(),
+            published: OnceLock::new(),
             sky: context.sky(shutter.middle()),
         }
     }
 
     fn remark(&self, index: usize) -> Option<Remark> {
-        let published =
-            |other: usize| get_or_compute(&self.published[other], || self.runs[other].run.publish(self.shutter));
-        let count = self.runs.len();
-        let neighbors =
-            OtherPhenomena { scene: &self.scene, count, published: &published, own_index: index, sky: &self.sky };
+        let publish = || PublishedByAll::new(self.runs.par_iter().map(|run| run.run.publish(self.shutter)).collect());
+        let published = || get_or_compute(&self.published, publish);
+        let neighbors = OtherPhenomena { scene: &self.scene, published: &published, own_index: index, sky: &self.sky };
         self.runs[index].built.phenomenon.remark(&neighbors)
     }
 }
@@ -72,7 +72,7 @@ const DRAWINGS: [&str; 2] = [".svg", ".svgz"];
 fn of_drawings(compiled: &CompiledScene) -> Vec<(String, Remark)> {
     let mut remarks = Vec::new();
     for instance in compiled.scene().instances.iter().filter(|instance| instance.enabled) {
-        let mut paths = instance.parameters.assets();
+        let mut paths = instance.parameters.asset_paths();
         paths.sort();
         paths.dedup();
         for path in paths.iter().filter(|path| DRAWINGS.iter().any(|drawing| path.ends_with(drawing))) {
@@ -82,6 +82,53 @@ fn of_drawings(compiled: &CompiledScene) -> Vec<(String, Remark)> {
         }
     }
     remarks
+}
+
+/// Where the camera looks along its `up`, so that the picture turns suddenly.
+fn turns_of_picture(plan: &Plan) -> Option<Remark> {
+    let frames = plan.frames();
+    let frame_s = plan.fps().frame_s();
+    let count = (frames.end - frames.start) as usize;
+    // From where the first shutter opens: a dome often begins at the zenith.
+    let first = plan.shutter_at(0.0).open;
+    let turns = sudden_turns(&plan.camera, first, frame_s, count);
+    let SuddenTurn { time, after_frame, degrees, better_up } = *turns.first()?;
+    let number = plan.number_at(after_frame as f64 * frame_s);
+    let others = match turns.len() {
+        1 => String::new(),
+        count => format!(", and {} more times until {:.3} s", count - 1, turns[count - 1].time),
+    };
+    let remedy = match better_up {
+        Some([x, y, z]) => format!("with `up = [{x}, {y}, {z}]` it does not"),
+        None => "key `up` to directions that the line of sight never meets".to_owned(),
+    };
+    let message = format!(
+        "the picture turns by {degrees:.0} degrees at {time:.3} s, between frames {number} and {}{others}, since the camera looks along its `up` there; \
+         {remedy}",
+        number + 1
+    );
+    Some(Remark::at("up", message))
+}
+
+/// Number of frames of a shot in which the view of each phenomenon is examined.
+const VIEWED_FRAMES: i64 = 9;
+
+/// What users should know about how the camera sees each phenomenon: in the first frame for which there is a remark, of some that are evenly distributed.
+fn of_views(compiled: &CompiledScene, plan: &Plan) -> Vec<(String, Remark)> {
+    let frames = plan.frames();
+    let last = frames.end - frames.start - 1;
+    let mut numbers: Vec<i64> =
+        (0..VIEWED_FRAMES).map(|index| frames.start + last * index / (VIEWED_FRAMES - 1)).collect();
+    numbers.dedup();
+    let views: Vec<View> = numbers.iter().map(|number| plan.view(*number)).collect();
+    let remark = |phenomenon: &Arc<dyn Phenomenon>| {
+        let viewed = numbers.iter().zip(&views);
+        let (number, remark) =
+            viewed.filter_map(|(number, view)| Some((number, phenomenon.view_remark(view)?))).next()?;
+        let message = format!("in frame {number} {}", remark.message);
+        Some((phenomenon.info().name.to_owned(), Remark { message, ..remark }))
+    };
+    compiled.phenomena().filter_map(remark).collect()
 }
 
 /// What users should know about how phenomena will look: the name of each phenomenon, and the remark.
@@ -109,12 +156,16 @@ pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remar
         );
         (PLATE_LAYER.to_owned(), Remark::new(message))
     });
+    let of_camera = turns_of_picture(plan).map(|remark| ("camera".to_owned(), remark));
     let of_phenomena = (0..runs.len()).filter_map(remark);
     plate
         .into_iter()
         .chain(of_plate_files(compiled))
+        .chain(plate_light_remark(compiled, plan).map(|message| (PLATE_LAYER.to_owned(), Remark::new(message))))
         .chain(of_drawings(compiled))
+        .chain(of_camera)
         .chain(of_phenomena)
+        .chain(of_views(compiled, plan))
         .chain(faint_phenomenon_remarks(compiled, plan))
         .collect()
 }

@@ -2,19 +2,14 @@
 
 use bansho_base::{
     camera::{Lens, VERTICAL_FOV_DEG},
-    math,
+    math::{self, DVec3},
     parameters::{Auto, BuildError, Node, ProblemKind, Range, Reader, Table, Value, nearest},
-    phenomenon::kind::PhenomenonKind,
+    tables::TableKind,
 };
 
-use crate::{
-    FORMAT, SHARED_TABLES, Scene,
-    tables::picture::LightKind,
-    text::path::{ValuePath, nearest_span},
-};
-use bansho_environment::{ground::Ground, lamps::Lamps, sky::SkyBackdrop, solids::Solids};
+use crate::{FORMAT, Scene, text::path::nearest_span};
 
-/// Checks the format number. Returns whether to read the rest: an older format has other keys, each of which would be reported as a further
+/// Checks the format number. Returns whether to read the rest: another format has other keys, each of which would be reported as a further
 /// problem.
 pub(super) fn format(root: &Table, reader: &mut Reader) -> bool {
     let Some(node) = root.get("bansho") else {
@@ -24,24 +19,18 @@ pub(super) fn format(root: &Table, reader: &mut Reader) -> bool {
     };
     reader.within("bansho", |reader| match node.value {
         Value::Integer(FORMAT) => {}
-        Value::Integer(found) if found > FORMAT => {
-            reader.report(node, ProblemKind::NewerFormat { found, known: FORMAT });
-        }
-        Value::Integer(found) => reader.report(node, ProblemKind::OlderFormat { found, known: FORMAT }),
+        Value::Integer(found) => reader.report(node, ProblemKind::UnsupportedFormat { found, allowed: FORMAT }),
         _ => {
             let found = node.value.type_name();
             reader.report(node, ProblemKind::WrongType { expected: format!("the format version, {FORMAT}"), found });
         }
     });
-    !matches!(node.value, Value::Integer(found) if found < FORMAT)
+    !matches!(node.value, Value::Integer(found) if found != FORMAT)
 }
 
-/// Reports keys at the root that are neither shared tables nor kinds of phenomena.
-pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) {
-    let known: Vec<&str> = std::iter::once("bansho")
-        .chain(SHARED_TABLES.iter().map(|table| table.key))
-        .chain(kinds.iter().map(|kind| kind.key))
-        .collect();
+/// Reports keys at the root that no kind has.
+pub(super) fn root_keys(root: &Table, kinds: &[TableKind], reader: &mut Reader) {
+    let known: Vec<&str> = std::iter::once("bansho").chain(kinds.iter().map(|kind| kind.key)).collect();
     for entry in &root.entries {
         if !known.contains(&entry.key.as_str()) {
             reader.report_with(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
@@ -53,31 +42,30 @@ pub(super) fn root_keys(root: &Table, kinds: &[PhenomenonKind], reader: &mut Rea
     }
 }
 
-/// Name of the layer of the plate.
-pub const PLATE_LAYER: &str = "plate";
-
-/// Names of layers that a scene has itself, and that no phenomenon may have.
-const RESERVED_NAMES: [&str; 5] = [PLATE_LAYER, SkyBackdrop::NAME, Ground::NAME, Lamps::NAME, Solids::NAME];
+/// Names of the layers of tables that are no phenomena, which no phenomenon may have.
+pub(super) fn reserved_names(kinds: &[TableKind]) -> Vec<&'static str> {
+    kinds.iter().filter_map(|kind| kind.layer).collect()
+}
 
 /// Names of the picture's own channels and layers in programs that read EXR files. A layer `Z` or `RGBA` makes OpenEXR's Python module refuse
 /// a file; `Combined`, `Alpha` and `Depth` replace the picture's own in Blender; Nuke calls them `rgba`, `alpha` and `depth`.
-const NAMES_RESERVED_BY_READERS: [&str; 18] = [
+pub(super) const NAMES_RESERVED_BY_READERS: [&str; 18] = [
     "R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W", "RGB", "RGBA", "rgba", "Alpha", "alpha", "Depth", "depth",
     "Combined",
 ];
 
 /// Maximum length of a name, bytes: Blender truncates names of layers, without the suffix after the dot, to this length.
-const MAX_NAME_BYTES: usize = 63;
+pub(super) const MAX_NAME_BYTES: usize = 63;
 
 /// Reads the name of a phenomenon. Its EXR layers have the same name, so it may not contain dots or control characters, and readers must not
 /// change it.
-pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
+pub(super) fn name(node: &Node, kinds: &[TableKind], reader: &mut Reader) -> Option<String> {
     let Value::Text(name) = &node.value else {
-        let expected = format!("a name of {}", allowed_names());
+        let expected = format!("a name of {}", allowed_names(kinds));
         reader.report(node, ProblemKind::WrongType { expected, found: node.value.type_name() });
         return None;
     };
-    match name_problem(name) {
+    match name_problem(name, kinds) {
         None => Some(name.clone()),
         Some(reason) => {
             reader.report(node, ProblemKind::Conflict(reason));
@@ -87,19 +75,19 @@ pub(super) fn name(node: &Node, reader: &mut Reader) -> Option<String> {
 }
 
 /// Reports a name that a phenomenon cannot have.
-pub(super) fn instance_name(name: &str, reader: &mut Reader) {
-    if let Some(reason) = name_problem(name) {
+pub(super) fn instance_name(name: &str, kinds: &[TableKind], reader: &mut Reader) {
+    if let Some(reason) = name_problem(name, kinds) {
         reader.report_value(ProblemKind::Conflict(reason));
     }
 }
 
-fn allowed_names() -> String {
-    let reserved = RESERVED_NAMES.join(", ");
+fn allowed_names(kinds: &[TableKind]) -> String {
+    let reserved = reserved_names(kinds).join(", ");
     format!("1 to {MAX_NAME_BYTES} bytes of text without dots and control characters, and none of {reserved}")
 }
 
 /// Why a phenomenon cannot have this name.
-fn name_problem(name: &str) -> Option<String> {
+fn name_problem(name: &str, kinds: &[TableKind]) -> Option<String> {
     let is_control_or_dot = |character: char| character == '.' || character.is_control();
     if NAMES_RESERVED_BY_READERS.contains(&name) {
         let others = NAMES_RESERVED_BY_READERS.join(", ");
@@ -108,11 +96,11 @@ fn name_problem(name: &str) -> Option<String> {
     }
     if name.len() > MAX_NAME_BYTES {
         let problem = format!("is a name of {} bytes, which programs that read EXR files would truncate", name.len());
-        return Some(format!("{problem}; allowed: {}", allowed_names()));
+        return Some(format!("{problem}; allowed: {}", allowed_names(kinds)));
     }
-    if name.trim().is_empty() || RESERVED_NAMES.contains(&name) || name.contains(is_control_or_dot) {
+    if name.trim().is_empty() || reserved_names(kinds).contains(&name) || name.contains(is_control_or_dot) {
         let problem = "cannot be a name, since the names of EXR channels begin with it";
-        return Some(format!("{problem}; allowed: {}", allowed_names()));
+        return Some(format!("{problem}; allowed: {}", allowed_names(kinds)));
     }
     None
 }
@@ -120,7 +108,7 @@ fn name_problem(name: &str) -> Option<String> {
 /// Checks combinations of parameters.
 pub(super) fn values(scene: &Scene, root: &Table, reader: &mut Reader) {
     camera(scene, root, reader);
-    lights(scene, root, reader);
+    scene.tables.report_conflicts(root, reader);
     plate(scene, root, reader);
 }
 
@@ -139,6 +127,11 @@ fn camera(scene: &Scene, root: &Table, reader: &mut Reader) {
         let kind = ProblemKind::Conflict("is where the camera stands; allowed: any other point".into());
         let span = nearest_span(root, "camera.target");
         reader.within("camera", |r| r.within("target", |r| r.report_at(span, kind)));
+    }
+    let has_up = |up: &[f64; 3]| DVec3::from(*up).try_normalize().is_some();
+    if !scene.camera.up.values().iter().all(has_up) {
+        let kind = ProblemKind::Conflict("is no direction; allowed: any three numbers that are not all 0".into());
+        report_build_error(BuildError { key: "up".into(), kind }, "camera".into(), root, reader);
     }
     field_of_view(scene, root, reader);
 }
@@ -168,27 +161,6 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
     );
 }
 
-/// A directed light needs a direction, and the inner cone of a spot must not exceed its outer cone. An inner cone that the file does not state
-/// is limited to the outer one.
-fn lights(scene: &Scene, root: &Table, reader: &mut Reader) {
-    for (index, light) in scene.lights.iter().enumerate() {
-        let path = format!("light.{index}");
-        let error = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
-        if light.is_directed() && !light.has_valid_direction() {
-            let reason = "is no direction; allowed: any three numbers that are not all 0".to_owned();
-            report_build_error(error("direction", reason), path.clone(), root, reader);
-        }
-        let stated = ValuePath::root().key("light").index(index).key("inner_cone_deg").find(root).is_some();
-        if light.kind == LightKind::Spot && stated && light.inner_cone_deg > light.outer_cone_deg {
-            let reason = format!(
-                "a spot with full intensity up to {} degrees cannot end at {}; allowed: up to `outer_cone_deg`",
-                light.inner_cone_deg, light.outer_cone_deg
-            );
-            report_build_error(error("inner_cone_deg", reason), path, root, reader);
-        }
-    }
-}
-
 /// The depth, its known points and the exposure of a plate need its image.
 fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
     if scene.plate.image.is_none() && scene.plate.depth.is_some() {
@@ -216,10 +188,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scene_of_an_older_format_is_one_error() {
-        let text = format!("bansho = {}\n[[light]]\nno_key = 1\n[nothing]\n", FORMAT - 1);
-        let error = Scene::parse("old.toml", &text, &[]).err().expect("an old scene is refused");
-        assert_eq!((error.problems.len(), error.omitted), (1, 0));
-        assert!(error.to_string().contains("`bansho upgrade` rewrites the file"), "{error}");
+    fn a_scene_of_another_format_is_one_error() {
+        for found in [FORMAT - 1, FORMAT + 1, 0, i64::MIN, i64::MAX] {
+            let text = format!("bansho = {found}\n[[light]]\nno_key = 1\n[nothing]\n");
+            let error = Scene::parse("other.toml", &text, &[]).err().expect("another format is refused");
+            assert_eq!((error.problems.len(), error.omitted), (1, 0), "{error}");
+            assert_eq!(error.problems[0].kind, ProblemKind::UnsupportedFormat { found, allowed: FORMAT });
+        }
     }
 }

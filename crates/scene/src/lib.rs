@@ -7,6 +7,7 @@ mod positions;
 pub mod report;
 #[cfg(feature = "schema")]
 pub mod schema;
+mod shared;
 mod tables;
 pub mod template;
 mod text;
@@ -15,25 +16,24 @@ use std::{collections::HashSet, fmt, sync::Arc};
 
 use bansho_base::{
     camera::{CameraParameters, SKY_FOV_DEG},
+    host::memory,
     parameters::{
-        self, Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, TableDescriptor, Value,
-        animated::Animated,
+        self, Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, Value, animated::Animated,
     },
-    phenomenon::kind::{self, CheckedParameters, Describe, PhenomenonKind},
-    world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
+    tables::{PhenomenonTable, ReadPhenomenon, TableKind, TableRole, find, phenomena},
+    world::{air::Air, wind::WindParameters},
 };
 
-use bansho_environment::ground::GroundParameters;
-
 pub use self::{
-    check::{PLATE_LAYER, report_build_error},
+    check::report_build_error,
     positions::Positions,
     report::SceneError,
+    shared::{SharedInstance, SharedTables},
     tables::{
-        defaults::ImpliedBackdrop,
-        depth::{DepthFit, DepthScale},
+        depth::{DepthDoubt, DepthFit, DepthScale, DepthValues},
         ground_fit::{GroundFit, PlateView},
-        picture::{self, DepthKind, FrameRate, LightParameters, PictureParameters, PlateAlpha, PlateParameters},
+        kinds::{self, PLATE_LAYER},
+        picture::{self, DepthKind, FrameRate, PictureParameters, PlateAlpha, PlateParameters},
         plate::{PlateDepth, PlatePictures, PlateRemark},
     },
     text::{
@@ -55,67 +55,33 @@ pub fn parse_values(text: &str) -> Result<Table, Problem> {
     toml::parse(text)
 }
 
-/// A shared table of the scene file: a table that is not a phenomenon.
-pub struct SharedTable {
-    /// Its key.
-    pub key: &'static str,
-    /// Whether it is a list of tables (`[[light]]`).
-    pub is_list: bool,
-    /// Its parameters.
-    pub table: fn() -> &'static TableDescriptor,
-    /// Makes the animated parameters of a scene periodic. Returns the first one whose values at the beginning and at the end differ.
-    close_loop: fn(&mut Scene, f64) -> Option<String>,
-}
-
-/// The shared tables in their recommended order.
-pub const SHARED_TABLES: [SharedTable; 9] = [
-    shared("picture", false, PictureParameters::table, |scene, seconds| scene.picture.close_loop(seconds)),
-    shared("camera", false, CameraParameters::table, |scene, seconds| scene.camera.close_loop(seconds)),
-    shared("plate", false, PlateParameters::table, |scene, seconds| scene.plate.close_loop(seconds)),
-    shared("wind", false, WindParameters::table, |scene, seconds| scene.wind.close_loop(seconds)),
-    shared("air", false, Air::table, |scene, seconds| scene.air.close_loop(seconds)),
-    shared("sky", false, SkyParameters::table, |scene, seconds| scene.sky.close_loop(seconds)),
-    shared("ground", false, GroundParameters::table, |scene, seconds| scene.ground.close_loop(seconds)),
-    shared("light", true, LightParameters::table, |scene, seconds| scene.lights.close_loop(seconds)),
-    shared("obstacle", true, ObstacleParameters::table, |scene, seconds| scene.obstacles.close_loop(seconds)),
-];
-
-const fn shared(
-    key: &'static str,
-    is_list: bool,
-    table: fn() -> &'static TableDescriptor,
-    close_loop: fn(&mut Scene, f64) -> Option<String>,
-) -> SharedTable {
-    SharedTable { key, is_list, table, close_loop }
-}
-
 /// A phenomenon of the scene.
 #[derive(Clone)]
 pub struct Instance {
     /// Its kind.
-    pub kind: PhenomenonKind,
+    pub kind: TableKind,
     /// Its name, unique in the scene.
     pub name: String,
     /// Whether it is drawn.
     pub enabled: bool,
     /// Its parameters.
-    pub parameters: Arc<dyn CheckedParameters>,
+    pub parameters: Arc<dyn PhenomenonTable>,
 }
 
 impl Instance {
     /// A phenomenon with parameters that a program has set. [`Scene::check`] checks them.
-    pub fn new<P: Describe>(name: impl Into<String>, parameters: P) -> Self {
-        Self { kind: P::KIND, name: name.into(), enabled: true, parameters: kind::set_parameters(parameters) }
+    pub fn new(name: impl Into<String>, parameters: impl PhenomenonTable) -> Self {
+        Self { kind: parameters.kind(), name: name.into(), enabled: true, parameters: Arc::new(parameters) }
     }
 
     /// The same phenomenon with other parameters, which a program has set.
     ///
     /// # Errors
     /// Every value that is out of range or not finite, with the path of its parameter and what is allowed.
-    pub fn with_parameters<P: Describe>(&self, parameters: P) -> Result<Self, ParameterProblems> {
+    pub fn with_parameters(&self, parameters: impl PhenomenonTable) -> Result<Self, ParameterProblems> {
         let changed = Self { enabled: self.enabled, ..Self::new(self.name.clone(), parameters) };
         let mut reader = Reader::new();
-        reader.within(self.name.clone(), |reader| changed.parameters.check_values(reader));
+        reader.within(self.name.clone(), |reader| changed.parameters.report_values(reader));
         if reader.is_clean() { Ok(changed) } else { Err(ParameterProblems(reader.into_problems())) }
     }
 }
@@ -141,6 +107,8 @@ impl fmt::Display for ParameterProblems {
 /// A checked scene.
 #[derive(Clone)]
 pub struct Scene {
+    /// The kinds of tables that it may have.
+    pub kinds: Arc<[TableKind]>,
     /// `[picture]`.
     pub picture: PictureParameters,
     /// `[camera]`.
@@ -151,18 +119,13 @@ pub struct Scene {
     pub wind: WindParameters,
     /// `[air]`.
     pub air: Air,
-    /// `[sky]`, if there is one.
-    pub sky: Option<SkyParameters>,
-    /// `[ground]`, if there is one.
-    pub ground: Option<GroundParameters>,
-    /// `[[light]]`.
-    pub lights: Vec<LightParameters>,
-    /// `[[obstacle]]`.
-    pub obstacles: Vec<ObstacleParameters>,
+    /// The tables that all phenomena share, such as sky, ground, lights and obstacles.
+    pub tables: SharedTables,
     /// Phenomena in the order of the file.
     pub instances: Vec<Instance>,
-    /// Which of sky, ground and lights are implied, since the text does not state them.
-    pub implied: ImpliedBackdrop,
+    /// Keys of the shared tables that the text omits and the phenomena imply. These always light the scene; they are visible if
+    /// [`SceneOptions::implied_backdrop`] is set.
+    pub implied: Vec<&'static str>,
     /// Seed of all random numbers: that of `[picture]`, or of [`SceneOptions`].
     pub seed: u64,
     /// Length of the seamless loop, a whole number of frames, s; `None` if the scene does not loop.
@@ -219,7 +182,7 @@ impl Scene {
     ///
     /// # Errors
     /// All problems of the text, each with its position, what is wrong and what is allowed.
-    pub fn parse(file: &str, text: &str, kinds: &[PhenomenonKind]) -> Result<Self, SceneError> {
+    pub fn parse(file: &str, text: &str, kinds: &[TableKind]) -> Result<Self, SceneError> {
         let fail = |Problems { listed, omitted }| SceneError {
             file: file.to_owned(),
             text: text.to_owned(),
@@ -242,7 +205,7 @@ impl Scene {
     ///
     /// # Errors
     /// All problems, each with the path of its parameter, what is wrong and what is allowed.
-    pub fn from_table(root: &Table, kinds: &[PhenomenonKind]) -> Result<Self, ParameterProblems> {
+    pub fn from_table(root: &Table, kinds: &[TableKind]) -> Result<Self, ParameterProblems> {
         let mut reader = Reader::new();
         let scene = Self::read(root, kinds, &mut reader);
         if reader.is_clean() {
@@ -262,10 +225,7 @@ impl Scene {
         reader.within("plate", |reader| self.plate.check_values(reader));
         reader.within("wind", |reader| self.wind.check_values(reader));
         reader.within("air", |reader| self.air.check_values(reader));
-        reader.within("sky", |reader| self.sky.iter().for_each(|sky| sky.check_values(reader)));
-        reader.within("ground", |reader| self.ground.iter().for_each(|ground| ground.check_values(reader)));
-        check_list("light", &self.lights, &mut reader);
-        check_list("obstacle", &self.obstacles, &mut reader);
+        self.tables.report_values(&mut reader);
         self.check_instances(&mut reader);
         check::values(self, &Table::default(), &mut reader);
         if reader.is_clean() { Ok(()) } else { Err(ParameterProblems(reader.into_problems())) }
@@ -275,23 +235,24 @@ impl Scene {
         let mut names = HashSet::new();
         for instance in &self.instances {
             reader.within(instance.name.clone(), |reader| {
-                check::instance_name(&instance.name, reader);
+                check::instance_name(&instance.name, &self.kinds, reader);
                 if !names.insert(instance.name.as_str()) {
                     reader.report_value(ProblemKind::DuplicateName { name: instance.name.clone() });
                 }
-                instance.parameters.check_values(reader);
+                instance.parameters.report_values(reader);
             });
         }
     }
 
-    /// Whence the plate of frame `frame` was taken: by the camera at the middle of the exposure, above the ground.
+    /// The view from which the plate of frame `frame` was taken: the camera at the middle of the exposure, and the height of the ground.
     pub fn plate_view(&self, frame: i64) -> PlateView {
         let size = self.picture.size.map(|side| side as usize);
         let frame_s = self.picture.fps.frame_s();
         let exposed_s = self.camera.shutter_s.unwrap_or(0.5 * frame_s);
         let time = (frame - self.picture.first_frame) as f64 * frame_s + self.camera.shutter_offset_s + 0.5 * exposed_s;
-        let ground_height = self.ground.as_ref().map(|ground| ground.height);
-        PlateView { camera: self.camera.at(time, size), size, ground_height }
+        let ground_height = self.tables.level_ground(time).map(|ground| ground.height);
+        let camera = self.camera.of_exposure(time, frame_s).at(time, size);
+        PlateView { camera, size, ground_height }
     }
 
     /// Applies the options: replaces the seed, closes the loop, hides the implied backdrop.
@@ -303,42 +264,56 @@ impl Scene {
             self.seed = seed;
         }
         if !options.implied_backdrop {
-            self.hide_implied_backdrop();
+            self.tables.hide(&self.implied);
         }
         self.loop_s = options.loop_s.map(|seconds| loop_length(seconds, self.picture.fps)).transpose()?;
         let Some(seconds) = self.loop_s else { return Ok(self) };
-        let discontinuity =
-            |table: &SharedTable| (table.close_loop)(&mut self, seconds).map(|rest| parameters::path(table.key, &rest));
-        match SHARED_TABLES.iter().find_map(discontinuity) {
+        match self.repeat_after(seconds) {
             Some(path) => Err(LoopError::NotSeamless { seconds, path }),
             None => Ok(self),
         }
     }
 
-    fn read(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Self {
+    /// Makes the keyframed values of all shared tables repeat. Returns the path of the first whose values at the beginning and at the end differ. Phenomena
+    /// do so when they are built.
+    fn repeat_after(&mut self, seconds: f64) -> Option<String> {
+        let tables = [
+            ("picture", self.picture.close_loop(seconds)),
+            ("camera", self.camera.close_loop(seconds)),
+            ("plate", self.plate.close_loop(seconds)),
+            ("wind", self.wind.close_loop(seconds)),
+            ("air", self.air.close_loop(seconds)),
+        ];
+        let jump = tables.into_iter().find_map(|(key, jump)| Some(parameters::path(key, &jump?)));
+        jump.or_else(|| self.tables.repeat_after(seconds))
+    }
+
+    fn read(root: &Table, kinds: &[TableKind], reader: &mut Reader) -> Self {
         check::root_keys(root, kinds, reader);
         let (completed, implied) = defaults::with_defaults(root, kinds);
         Self::read_completed(&completed, kinds, implied, reader).with_camera_toward_sky(&completed)
     }
 
     /// Reads a scene from a `root` that includes the defaults of [`defaults::with_defaults`].
-    fn read_completed(root: &Table, kinds: &[PhenomenonKind], implied: ImpliedBackdrop, reader: &mut Reader) -> Self {
-        let picture: PictureParameters = read_shared(root, "picture", reader);
-        Self {
+    fn read_completed(root: &Table, kinds: &[TableKind], implied: Vec<&'static str>, reader: &mut Reader) -> Self {
+        let picture: PictureParameters = read_field(root, "picture", reader);
+        reader.set_frame_rate(picture.fps.frames, picture.fps.seconds);
+        let mut scene = Self {
+            kinds: kinds.into(),
             seed: picture.seed as u64,
             loop_s: None,
             picture,
-            camera: read_shared(root, "camera", reader),
-            plate: read_shared(root, "plate", reader),
-            wind: read_shared(root, "wind", reader),
-            air: read_shared(root, "air", reader),
-            sky: root.get("sky").map(|_| read_shared(root, "sky", reader)),
-            ground: root.get("ground").map(|_| read_shared(root, "ground", reader)),
-            lights: read_many(root, "light", reader),
-            obstacles: read_many(root, "obstacle", reader),
+            camera: read_field(root, "camera", reader),
+            plate: read_field(root, "plate", reader),
+            wind: read_field(root, "wind", reader),
+            air: read_field(root, "air", reader),
+            tables: SharedTables::read(root, kinds, reader),
             instances: read_instances(root, kinds, reader),
             implied,
-        }
+        };
+        let white_of_light = || scene.tables.iter().find_map(|table| table.parameters.white_balance_k());
+        scene.picture.white_balance_k = scene.picture.white_balance_k.or_else(white_of_light);
+        scene
     }
 
     /// Points a camera without position and target at the sky if all phenomena are in the sky.
@@ -349,7 +324,11 @@ impl Scene {
         };
         let all_in_the_sky =
             !self.instances.is_empty() && self.instances.iter().all(|instance| instance.kind.in_the_sky);
-        if all_in_the_sky && self.obstacles.is_empty() && !self.has_plate() && !states("position") && !states("target")
+        if all_in_the_sky
+            && !self.tables.iter().any(determines_view)
+            && !self.has_plate()
+            && !states("position")
+            && !states("target")
         {
             self.camera.look_up();
             if !states("vertical_fov_deg") {
@@ -362,28 +341,18 @@ impl Scene {
     /// The paths of all files that the scene names, as they are in its text.
     pub fn asset_paths(&self) -> Vec<String> {
         let plate = [&self.plate.image, &self.plate.depth].into_iter().flatten();
-        let obstacles = self.obstacles.iter().filter_map(|obstacle| obstacle.file.as_ref());
-        let shared = plate.chain(obstacles).map(|path| path.0.clone());
-        shared.chain(self.instances.iter().flat_map(|instance| instance.parameters.assets())).collect()
+        let shared = self.tables.iter().flat_map(|table| table.parameters.asset_paths());
+        plate
+            .map(|path| path.0.clone())
+            .chain(shared)
+            .chain(self.instances.iter().flat_map(|instance| instance.parameters.asset_paths()))
+            .collect()
     }
 
-    /// Hides the implied sky, ground and lamps; sky and lamps still light the scene.
-    fn hide_implied_backdrop(&mut self) {
-        if let Some(sky) = self.sky.as_mut().filter(|_| self.implied.sky) {
-            sky.visible = false;
-        }
-        if self.implied.ground {
-            self.ground = None;
-        }
-        if self.implied.lights {
-            self.lights.iter_mut().for_each(|light| light.visible = false);
-        }
-    }
-
-    /// Whether a sky or a ground that the text states is visible.
+    /// Whether a sky, a ground or another table that fills the background is visible, and stated by the text.
     pub fn shows_stated_backdrop(&self) -> bool {
-        let sky = self.sky.as_ref().is_some_and(|sky| sky.visible) && !self.implied.sky;
-        sky || self.ground.is_some() && !self.implied.ground
+        let is_stated = |table: &SharedInstance| !self.implied.contains(&table.kind.key);
+        self.tables.iter().any(|table| table.parameters.fills_background() && is_stated(table))
     }
 
     /// Whether the phenomena are composited over a plate.
@@ -392,57 +361,30 @@ impl Scene {
     }
 }
 
-fn read_shared<P: Parameters>(root: &Table, key: &'static str, reader: &mut Reader) -> P {
-    let Some(node) = root.get(key) else { return P::default() };
-    reader.within(key, |reader| match &node.value {
-        Value::Table(table) => P::read_table(table, reader, &[]),
-        _ => {
-            let found = node.value.type_name();
-            reader.report(node, ProblemKind::WrongType { expected: format!("a table [{key}]"), found });
-            P::default()
-        }
-    })
+fn read_field<P: Parameters>(root: &Table, key: &'static str, reader: &mut Reader) -> P {
+    let Some(table) = shared::single(root, key, reader) else { return P::default() };
+    reader.within(key, |reader| P::read_table(table, reader, &[]))
 }
 
-/// The tables of the list `[[key]]`.
-fn tables<'a>(root: &'a Table, key: &'static str, reader: &mut Reader) -> Vec<&'a Table> {
-    let Some(node) = root.get(key) else { return Vec::new() };
-    let mut tables = Vec::new();
-    let items = match &node.value {
-        Value::List(items) => items.as_slice(),
-        _ => std::slice::from_ref(node),
-    };
-    for item in items {
-        match &item.value {
-            Value::Table(table) if matches!(node.value, Value::List(_)) => tables.push(table),
-            value => {
-                let kind = ProblemKind::WrongType {
-                    expected: format!("tables [[{key}]], with double brackets"),
-                    found: value.type_name(),
-                };
-                reader.within(key, |reader| reader.report(item, kind));
-            }
-        }
-    }
-    tables
+/// Whether a table determines what a picture shows, so that the camera is not aimed by the phenomena.
+fn determines_view(table: &SharedInstance) -> bool {
+    table.kind.shared_role().is_some_and(|role| role.determines_view)
 }
 
-fn read_many<P: Parameters>(root: &Table, key: &'static str, reader: &mut Reader) -> Vec<P> {
-    let tables = tables(root, key, reader);
-    let read = |(index, table): (usize, &&Table)| {
-        reader.within(format!("{key}.{index}"), |reader| P::read_table(table, reader, &[]))
-    };
-    tables.iter().enumerate().map(read).collect()
-}
-
-fn read_instances(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -> Vec<Instance> {
+fn read_instances(root: &Table, kinds: &[TableKind], reader: &mut Reader) -> Vec<Instance> {
     let mut instances: Vec<Instance> = Vec::new();
+    if !check_instance_memory(root, kinds, reader) {
+        return instances;
+    }
     let mut names = HashSet::new();
     for entry in &root.entries {
-        let Some(kind) = kinds.iter().find(|kind| kind.key == entry.key) else { continue };
-        for (index, table) in tables(root, kind.key, reader).into_iter().enumerate() {
+        let Some(kind) = find(kinds, &entry.key) else { continue };
+        let TableRole::Phenomenon(read) = kind.role else { continue };
+        for (index, table) in shared::items(root, kind.key, reader).into_iter().enumerate() {
             let instance = reader.within(format!("{}.{index}", kind.key), |reader| {
-                let instance = read_instance(*kind, index, table, reader);
+                let name = table.get("name").and_then(|node| reader.within("name", |r| check::name(node, kinds, r)));
+                let name = name.unwrap_or_else(|| default_name(kind.key, index));
+                let instance = read_instance(*kind, name, read, table, reader);
                 if !names.insert(instance.name.clone()) {
                     let span = table.get("name").map_or(entry.key_span.clone(), |node| node.span.clone());
                     reader.report_at(Some(span), ProblemKind::DuplicateName { name: instance.name.clone() });
@@ -455,21 +397,31 @@ fn read_instances(root: &Table, kinds: &[PhenomenonKind], reader: &mut Reader) -
     instances
 }
 
-fn read_instance(kind: PhenomenonKind, index: usize, table: &Table, reader: &mut Reader) -> Instance {
-    let name = table.get("name").and_then(|node| reader.within("name", |reader| check::name(node, reader)));
-    let enabled = table.get("enabled").and_then(|node| reader.within("enabled", |r| bool::read(node, &(), "", r)));
-    Instance {
-        kind,
-        name: name.unwrap_or_else(|| default_name(kind.key, index)),
-        enabled: enabled.unwrap_or(true),
-        parameters: Arc::from((kind.read)(table, reader)),
+/// Whether the system can allocate the memory of all phenomena, before any is read; reports the most that fit.
+fn check_instance_memory(root: &Table, kinds: &[TableKind], reader: &mut Reader) -> bool {
+    let mut bytes = 0.0;
+    for entry in &root.entries {
+        let Some(kind) = phenomena(kinds).find(|kind| kind.key == entry.key) else { continue };
+        let Some(Value::List(items)) = root.get(kind.key).map(|node| &node.value) else { continue };
+        let count = items.len();
+        let others = bytes;
+        bytes += count as f64 * kind.built_bytes;
+        if memory::can_allocate(bytes) {
+            continue;
+        }
+        let fits = |count: i64| memory::can_allocate(others + count as f64 * kind.built_bytes);
+        let most = memory::largest_fitting_count(count as i64, fits);
+        let required = memory::format_bytes(bytes as u64);
+        let message = format!("{count} tables [[{}]] would take {required}; allowed: up to {most}", kind.key);
+        reader.report_at(Some(entry.key_span.clone()), ProblemKind::Conflict(message));
+        return false;
     }
+    true
 }
 
-fn check_list<P: Parameters>(key: &'static str, list: &[P], reader: &mut Reader) {
-    for (index, parameters) in list.iter().enumerate() {
-        reader.within(key, |reader| reader.within(index.to_string(), |reader| parameters.check_values(reader)));
-    }
+fn read_instance(kind: TableKind, name: String, read: ReadPhenomenon, table: &Table, reader: &mut Reader) -> Instance {
+    let enabled = table.get("enabled").and_then(|node| reader.within("enabled", |r| bool::read(node, &(), "", r)));
+    Instance { kind, name, enabled: enabled.unwrap_or(true), parameters: read(table, reader) }
 }
 
 fn default_name(key: &str, index: usize) -> String {

@@ -1,18 +1,22 @@
 //! The positions of phenomena and their parameters in the text of a scene.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, sync::Arc};
 
-use bansho_base::parameters::Table;
+use bansho_base::{
+    parameters::Table,
+    tables::{self, TableKind},
+};
 
 use crate::{
     Instance, LineColumn, Scene,
-    check::PLATE_LAYER,
+    tables::kinds::PLATE_LAYER,
     text::{lines::Lines, path::nearest_span, toml},
 };
 
 /// Finds the positions of any number of phenomena. The text is parsed once.
 pub struct Positions<'t> {
     root: Option<Table>,
+    kinds: Arc<[TableKind]>,
     lines: Lines<'t>,
     /// The path of each phenomenon, such as `rain.1`, by its name.
     paths: HashMap<String, String>,
@@ -29,18 +33,21 @@ impl<'t> Positions<'t> {
             (instance.name.clone(), format!("{}.{}", instance.kind.key, *index - 1))
         };
         let paths = scene.instances.iter().map(path).collect();
-        Self { root: toml::parse(text).ok(), lines: Lines::new(text), paths }
+        Self { root: toml::parse(text).ok(), kinds: scene.kinds.clone(), lines: Lines::new(text), paths }
     }
 
     /// Line and column of the parameter `key` of the phenomenon `name`, or of the nearest table above it that the text contains. The name of the
-    /// plate is [`PLATE_LAYER`]. `None` if the text does not contain the phenomenon.
+    /// plate is [`PLATE_LAYER`], and tables that are no phenomena have their keys. `None` if the text does not contain the phenomenon.
     pub fn find(&mut self, name: &str, key: Option<&str>) -> Option<LineColumn> {
         let root = self.root.as_ref()?;
-        let span = if name == PLATE_LAYER {
-            nearest_span(root, name)?
-        } else {
-            let rest = key.map_or_else(String::new, |key| format!(".{key}"));
-            nearest_span(root, &format!("{}{rest}", self.paths.get(name)?))?
+        let rest = key.map_or_else(String::new, |key| format!(".{key}"));
+        let span = match self.paths.get(name) {
+            _ if name == PLATE_LAYER => nearest_span(root, name)?,
+            Some(path) => nearest_span(root, &format!("{path}{rest}"))?,
+            None if tables::shared(&self.kinds).any(|kind| kind.key == name) => {
+                nearest_span(root, &format!("{name}{rest}"))?
+            }
+            None => return None,
         };
         Some(self.lines.position(span.start))
     }

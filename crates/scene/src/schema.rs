@@ -1,20 +1,24 @@
 //! The JSON schema of scene files, with which text editors complete keys and check values.
 
-use bansho_base::parameters::{Descriptor, Kind, TableDescriptor, Value};
+use bansho_base::{
+    parameters::{Descriptor, Kind, TableDescriptor, Value},
+    tables::TableKind,
+};
 use serde_json::{Value as Json, json};
 
-use super::{FORMAT, PhenomenonKind, SHARED_TABLES};
+use super::{
+    FORMAT,
+    check::{MAX_NAME_BYTES, NAMES_RESERVED_BY_READERS, reserved_names},
+};
 
-/// The schema (JSON Schema 2020-12) of scene files for these kinds of phenomena.
-pub fn schema(kinds: &[PhenomenonKind]) -> Json {
+/// The schema (JSON Schema 2020-12) of scene files with these kinds of tables.
+pub fn schema(kinds: &[TableKind]) -> Json {
     let mut properties = serde_json::Map::new();
     properties.insert("bansho".into(), json!({ "description": "Format version.", "const": FORMAT }));
-    for shared in &SHARED_TABLES {
-        let table = table((shared.table)(), false);
-        properties.insert(shared.key.into(), if shared.is_list { list_of(table) } else { table });
-    }
     for kind in kinds {
-        properties.insert(kind.key.into(), list_of(table((kind.table)(), true)));
+        let name = kind.is_phenomenon().then(|| name_schema(kinds));
+        let table = table((kind.table)(), name);
+        properties.insert(kind.key.into(), if kind.is_list() { list_of(table) } else { table });
     }
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -30,10 +34,11 @@ fn list_of(item: Json) -> Json {
     json!({ "type": "array", "items": item })
 }
 
-fn table(descriptor: &TableDescriptor, is_phenomenon: bool) -> Json {
+/// The schema of a table. Phenomena have a `name` with that schema, and can be disabled.
+fn table(descriptor: &TableDescriptor, name: Option<Json>) -> Json {
     let mut properties = serde_json::Map::new();
-    if is_phenomenon {
-        properties.insert("name".into(), json!({ "type": "string", "description": "Unique name; names its layers." }));
+    if let Some(name) = name {
+        properties.insert("name".into(), name);
         properties.insert("enabled".into(), json!({ "type": "boolean", "default": true }));
     }
     for parameter in &descriptor.parameters {
@@ -44,6 +49,21 @@ fn table(descriptor: &TableDescriptor, is_phenomenon: bool) -> Json {
         "description": descriptor.doc,
         "additionalProperties": false,
         "properties": properties,
+    })
+}
+
+/// The name of a phenomenon, as the parser takes it.
+fn name_schema(kinds: &[TableKind]) -> Json {
+    // No dots or control characters, and at least one letter that is no space.
+    let pattern = r"^[^.\x00-\x1f\x7f-\x9f]*[^.\s\x00-\x1f\x7f-\x9f][^.\x00-\x1f\x7f-\x9f]*$";
+    let reserved = [&reserved_names(kinds)[..], &NAMES_RESERVED_BY_READERS[..]].concat();
+    json!({
+        "type": "string",
+        "description": "Unique name; names its layers.",
+        "minLength": 1,
+        "maxLength": MAX_NAME_BYTES,
+        "pattern": pattern,
+        "not": { "enum": reserved },
     })
 }
 
@@ -80,7 +100,7 @@ fn kind(kind: &Kind) -> Json {
         Kind::List { item, min, max } => {
             json!({ "type": "array", "items": self::kind(item), "minItems": min, "maxItems": max })
         }
-        Kind::Table(descriptor) => table(descriptor(), false),
+        Kind::Table(descriptor) => table(descriptor(), None),
     }
 }
 

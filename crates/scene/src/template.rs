@@ -2,47 +2,40 @@
 //! its unit. In complete ones, parameters with other values than their defaults are stated; the others are comments with the default. Both
 //! draw the same picture.
 
-use bansho_base::parameters::{Descriptor, Kind, Table, TableDescriptor, Value};
+use bansho_base::{
+    parameters::{Descriptor, Kind, Table, TableDescriptor, Value},
+    tables::{self, TableCount, TableKind},
+};
 
-use super::{FORMAT, PhenomenonKind, SHARED_TABLES, SharedTable, text::toml};
+use super::{FORMAT, text::toml};
 
-/// Optional shared tables, which a new scene only has if the phenomenon's setting has them.
-const OPTIONAL: [&str; 5] = ["plate", "sky", "ground", "light", "obstacle"];
-
-/// Parameters of shared tables that users change first, in addition to those of the setting.
-const FIRST_SHARED: [(&str, &[&str]); 3] = [
-    ("picture", &["size", "frames", "fps"]),
-    ("camera", &["position", "target", "vertical_fov_deg"]),
-    ("wind", &["velocity", "gust"]),
-];
-
-/// A short scene with one phenomenon of `kind` in its setting: the parameters that users change first, each with a brief comment.
-pub fn short(kind: &PhenomenonKind) -> String {
+/// A short scene with one phenomenon of `kind` and its scene defaults: the parameters that users change first, each with a brief comment. Of the
+/// shared tables of the registry `kinds` it has those that the scene defaults or [`TableKind::first_keys`] name.
+pub fn short(kind: &TableKind, kinds: &[TableKind]) -> String {
     // A test checks that all settings can be parsed.
     let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
     let mut text = format!("bansho = {FORMAT}   # format version\n");
-    let (several, others): (Vec<&SharedTable>, Vec<&SharedTable>) =
-        SHARED_TABLES.iter().partition(|shared| tables(&setting, shared.key).len() > 1);
+    let (several, others): (Vec<&TableKind>, Vec<&TableKind>) =
+        tables::shared(kinds).partition(|shared| stated_tables(&setting, shared.key).len() > 1);
     // A list of inline tables belongs to the root, before the first table.
-    several.iter().for_each(|shared| brief_list(&mut text, shared, &tables(&setting, shared.key)));
+    several.iter().for_each(|shared| brief_list(&mut text, shared, &stated_tables(&setting, shared.key)));
     for shared in others {
-        let first = FIRST_SHARED.iter().find(|(key, _)| *key == shared.key).map_or(&[][..], |(_, keys)| keys);
-        let stated = tables(&setting, shared.key);
-        let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
+        let first = shared.first_keys;
+        let stated = stated_tables(&setting, shared.key);
         let empty = Table::default();
-        // A table with keys to change first is written even if the setting does not have it.
+        // A table with keys to change first is written even if the scene defaults do not have it.
         let unstated = (stated.is_empty() && !first.is_empty()).then_some(&empty);
         for stated in stated.into_iter().chain(unstated) {
-            brief_table(&mut text, &header, (shared.table)(), stated, first);
+            brief_table(&mut text, &shared.header(), (shared.table)(), stated, first);
         }
     }
-    let stated = tables(&setting, kind.key).first().copied().cloned().unwrap_or_default();
-    brief_table(&mut text, &format!("[[{}]]", kind.key), (kind.table)(), &stated, kind.first_keys);
+    let stated = stated_tables(&setting, kind.key).first().copied().cloned().unwrap_or_default();
+    brief_table(&mut text, &kind.header(), (kind.table)(), &stated, kind.first_keys);
     text
 }
 
 /// A list of tables, one on each line.
-fn brief_list(text: &mut String, shared: &SharedTable, tables: &[&Table]) {
+fn brief_list(text: &mut String, shared: &TableKind, tables: &[&Table]) {
     text.push('\n');
     comment(text, &format!("{} More can be added here.", (shared.table)().doc));
     text.push_str(&format!("{} = [\n", shared.key));
@@ -111,28 +104,28 @@ fn brief(parameter: &Descriptor, after: usize) -> String {
     format!("{sentence}{unit}")
 }
 
-/// A complete scene with one phenomenon of `kind` in its setting, with a comment for each parameter.
-pub fn commented(kind: &PhenomenonKind) -> String {
+/// A complete scene with one phenomenon of `kind` and its scene defaults, with a comment for each parameter. Optional tables of the
+/// registry `kinds` are in it only if the scene defaults have them.
+pub fn commented(kind: &TableKind, kinds: &[TableKind]) -> String {
     // A test checks that all settings can be parsed.
     let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
     let mut text = format!("bansho = {FORMAT}   # format version\n");
-    for shared in SHARED_TABLES {
-        let stated = tables(&setting, shared.key);
-        if stated.is_empty() && !OPTIONAL.contains(&shared.key) {
-            table(&mut text, &format!("[{}]", shared.key), (shared.table)(), &Table::default());
+    for shared in tables::shared(kinds) {
+        let stated = stated_tables(&setting, shared.key);
+        if stated.is_empty() && shared.count == TableCount::One {
+            table(&mut text, &shared.header(), (shared.table)(), &Table::default());
         }
         for stated in stated {
-            let header = if shared.is_list { format!("[[{}]]", shared.key) } else { format!("[{}]", shared.key) };
-            table(&mut text, &header, (shared.table)(), stated);
+            table(&mut text, &shared.header(), (shared.table)(), stated);
         }
     }
-    let stated = tables(&setting, kind.key).first().copied().cloned().unwrap_or_default();
-    table(&mut text, &format!("[[{}]]", kind.key), (kind.table)(), &stated);
+    let stated = stated_tables(&setting, kind.key).first().copied().cloned().unwrap_or_default();
+    table(&mut text, &kind.header(), (kind.table)(), &stated);
     text
 }
 
 /// The table or the tables of a key.
-fn tables<'a>(setting: &'a Table, key: &str) -> Vec<&'a Table> {
+fn stated_tables<'a>(setting: &'a Table, key: &str) -> Vec<&'a Table> {
     match setting.get(key).map(|node| &node.value) {
         Some(Value::Table(table)) => vec![table],
         Some(Value::List(items)) => {

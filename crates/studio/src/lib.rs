@@ -9,10 +9,10 @@
 //! Without a GPU, the crate `bansho-egui-software` paints the window.
 
 pub mod app;
-#[cfg(not(target_arch = "wasm32"))]
-pub mod bench;
 pub mod document;
 pub mod editors;
 pub mod player;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod renderer_choice;
 pub mod scenes;
 pub mod session;

@@ -70,6 +70,7 @@ impl CameraPose {
             lens: self.lens,
             position: self.position.to_array().into(),
             target: self.target.to_array().into(),
+            up: CameraParameters::default().up,
             roll_deg: self.roll_deg.into(),
             vertical_fov_deg: self.vertical_fov_deg.into(),
             focal_length_mm: None,

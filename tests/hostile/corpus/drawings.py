@@ -41,6 +41,48 @@ def _doubling_uses() -> str:
     return _svg(f'<defs><path id="g0" d="M1 5L9 5"/>{groups}</defs><use href="#g40"/>')
 
 
+def _nested(depth: int, css: str) -> str:
+    return f"<svg><style>{css}</style>{'<g>' * depth}{LINE}{'</g>' * depth}</svg>"
+
+
+def _style_sheets() -> list[Case]:
+    """Selectors that a matcher might try again and again, and sheets that are much more than their drawing."""
+    chains = [(8, 60), (5, 120), (200, 250)]
+    rules = lines(30_000, lambda index: f".c{index} .d{index}{{display:none}}", "<svg><style>", f"</style>{'<g/>' * 3000}{LINE}</svg>")
+    cases = [_drawing(f"a selector of {length} names within {depth} groups", _nested(depth, f"x {'g ' * length}path{{display:none}}"), 0) for length, depth in chains]
+    return [
+        *cases,
+        _drawing("30,000 rules", rules, 0, signaled=True, large=True),
+        _drawing("30,000 rules for all of 30,000 elements", parts(("<svg><style>", 1), ("*{display:inline}", 30_000), ("</style>", 1), (LINE, 30_000), ("</svg>", 1)), 3, "comparisons", signaled=True, large=True),
+        _drawing("a million selectors of one rule", parts(("<svg><style>", 1), ("a,", MEGA), (f"b{{display:none}}</style>{LINE}</svg>", 1)), 3, "parts of selectors", signaled=True, large=True),
+        _drawing("10,000 selectors with 10,000 declarations", parts(("<svg><style>", 1), ("a,", 10_000), ("b{", 1), ("display:none;", 10_000), (f"}}</style>{LINE}</svg>", 1)), 0),
+        _drawing("a million comments in a selector", parts(("<svg><style>a", 1), ("/**/", MEGA), (f"b{{display:none}}</style>{LINE}</svg>", 1)), 0, signaled=True, large=True),
+        _drawing("a million open comments", parts(("<svg><style>", 1), ("/*", MEGA), (f"</style>{LINE}</svg>", 1)), 0),
+        _drawing("a million open braces", parts(("<svg><style>", 1), ("{", MEGA), (f"</style>{LINE}</svg>", 1)), 0, signaled=True),
+        _drawing("20,000 classes of 2,000 elements", parts(("<svg><style>", 1), (".a{display:inline}", 20_000), ("</style>", 1), ('<path class="a a b" d="M1 5L9 5"/>', 2000), ("</svg>", 1)), 3, "comparisons"),
+        _drawing("a style sheet that is none", _svg("<style>" + "}}{{;;@@,,>>++" * 1000 + "</style>" + LINE), 0),
+    ]
+
+
+def _markup() -> list[Case]:
+    """Entities, namespaces and nesting by which a parser would do far more than it reads."""
+    entity = f"<!DOCTYPE svg [<!ENTITY a '{'x' * MEGA}'>]>"
+    twice = "<!DOCTYPE svg [<!ENTITY p \"<path d='M1000000 1000000l1 0l0 1'/>\">]><svg>&p;&p;</svg>"
+    prefixes = "".join(f' xmlns:a{index}="{index}"' for index in range(4000))
+    return [
+        _drawing("a megabyte a thousand times by an entity", parts((entity + "<svg><desc>", 1), ("&a;", 1000), (f"</desc>{LINE}</svg>", 1)), words="entities are replaced"),
+        _drawing("30,000 entities", lines(30_000, lambda index: f"<!ENTITY a{index} 'x'>", "<!DOCTYPE svg [", f"]><svg>{LINE}</svg>"), words="entities; allowed"),
+        _drawing("an element of an entity, twice", twice, (0, 3)),
+        _drawing("4,000 namespaces copied by 200,000 elements", parts((f"<svg{prefixes}>", 1), ('<g xmlns:a="b"/>', 200_000), (LINE + "</svg>", 1)), words="namespaces", large=True),
+        _drawing("100,000 attributes behind a bracket", _svg("<path a='>' " + "".join(f"a{index}='1' " for index in range(100_000)) + "d='M1 5L9 5'/>"), words="attributes"),
+        _drawing("200,000 uses within one another", parts(("<svg>", 1), ("<use>", 200_000), ("</use>", 200_000), ("</svg>", 1)), words="deep", large=True),
+        _drawing("600 groups that use one another in a chain", _svg("<defs><path id='g0' d='M1 5L9 5'/>" + "".join(f"<g id='g{index}'><use href='#g{index - 1}'/></g>" for index in range(1, 600)) + "</defs><use href='#g599'/>"), words="deep"),
+        _drawing("a doubling behind two targets", _doubling_uses().replace("<svg ", '<svg xmlns:x="http://www.w3.org/1999/xlink" ').replace('<use href="', '<use x:href="#none" href=" '), words="points"),
+        _drawing("a transform of a megabyte, used a thousand times", _svg(f"<defs><path id='a' transform='{'rotate(1)' * 100_000}' d='M1 5L9 5'/></defs>" + "<use href='#a'/>" * 1000), words="bytes"),
+        _drawing("20,000 nested drawings, each of which clips", _svg('<svg width="5" height="5"><path d="M1 1L9 5"/></svg>' * 20_000), (0, 3)),
+    ]
+
+
 def cases() -> list[Case]:
     head, tail = _svg("|").split("|")
     external = '<!DOCTYPE svg [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
@@ -61,7 +103,7 @@ def cases() -> list[Case]:
         _drawing("uses that double 40 times", _doubling_uses(), words="points"),
         _drawing("a use of itself", _svg('<g id="a"><use href="#a"/></g>'), words="use themselves"),
         _drawing("NUL", _svg(LINE).replace("svg", "s\0vg"), words=""),
-        _drawing("a billion laughs", _laughs(), words="entity"),
+        _drawing("a billion laughs", _laughs(), words="entities"),
         _drawing("an external entity", external + _svg('<path d="&x;"/>'), words="entity"),
         _drawing("an external entity beside a stroke", external + _svg("<text>&x;</text>" + LINE), words="entity"),
         _drawing("an external style sheet", '<?xml-stylesheet href="file:///dev/zero"?>' + _svg(f'<image href="/dev/zero"/>{LINE}'), 0),
@@ -106,6 +148,8 @@ def cases() -> list[Case]:
         _drawing("1,000,000 declarations without brackets", parts(("<!a>", MEGA), (_svg(LINE), 1)), (0, 3), signaled=True, large=True),
         _drawing("15 MB of text", parts((head, 1), ("a" * 1000, 15_000), (LINE + tail, 1)), 0, signaled=True, large=True),
         _drawing("an id of a megabyte", _svg(f'<path id="{"a" * MEGA}" d="L"/>'), words="path"),
+        *_style_sheets(),
+        *_markup(),
         Case("svg", "an id that is not there", ["check", "scene.toml"], 3, r"^error: scene\.toml:9:15: aurora\.0\.shapes\.0\.sheets\.0\.svg_path_id .*no stroke of the id `gone`",
              {"scene.toml": SCENE + 'svg_path_id = "gone"\n', "drawing.svg": _svg(LINE)}),
     ]

@@ -22,6 +22,32 @@ def _refused(name: str, options: list[str], words: str) -> Case:
     return Case("plan", name, [*PLAN, *options], 2, rf"^error: .*({words})", {"scene.toml": FLAME}, leaves=["out/*"])
 
 
+FARM_FILES = ("plan.json", "token", "jobs", "submit.sh", "check.sbatch", "snapshots.sbatch", "frames.sbatch", "finish.sbatch")
+THERE = "somebody's own work\n"
+
+
+def _kept(name: str, content: Content, says: str, command: list[str] = PLAN, file: str = "out/a.farm/token") -> Case:
+    """What stands where the farm would write is kept."""
+    return Case("plan", name, command, (1, 2), rf"^error: .*{says}", {"scene.toml": FLAME, file: content})
+
+
+def _foreign() -> list[Case]:
+    found = []
+    for file in FARM_FILES:
+        path = f"out/a.farm/{file}"
+        found.append(_kept(f"a scene linked as {file}", link("../../scene.toml"), "is a link", file=path))
+        found.append(_kept(f"a scene linked as {file}, with --overwrite", link("../../scene.toml"), "is a link", [*PLAN, "--overwrite"], file=path))
+        found.append(_kept(f"somebody's {file}", THERE, "not made by Bansho", file=path))
+    template = ["farm", "openjd", "scene.toml", "-o", "shot.yaml"]
+    return [
+        *found,
+        _kept("somebody's template", "specificationVersion: jobtemplate-2023-09\n", "not made by Bansho", template, "shot.yaml"),
+        _kept("a scene linked as a template", link("scene.toml"), "(is a file that the scene|not made by Bansho)", template, "shot.yaml"),
+        Case("plan", "edited options", ["farm", "status", *OUT], (1, 2), r"^error: .*plan of tasks was changed", {"scene.toml": FLAME}, setup=[PLAN, ["render", "scene.toml", "-o", "out/a.png", "--frames", "0"]],
+             damage={FILE: '{"format": 2, "arguments": ["--out=/elsewhere/a.png", "--", "scene.toml"],\n  "digest": "' + "0" * 64 + '"\n}\n'}),
+    ]
+
+
 def cases() -> list[Case]:
     fields = '"format": 1, "program": "Bansho 0.1.0", "token": "0", "arithmetic": "0", "folder": ".", "arguments": [], "frames": "0-9", "first_frame": 0'
     costs = '"costs": {"startup_s": 0, "step_s": 0, "draw_s": 0, "frame_bytes": 0, "snapshot_bytes": 0}'
@@ -37,6 +63,7 @@ def cases() -> list[Case]:
         _plan("endless", link("/dev/zero"), signaled=True),
         _plan("a folder", folder),
         _plan("a sparse file of 3.9 GB", sparse(3_900_000_000), signaled=True),
+        *_foreign(),
         _task("an endless token", link("/dev/zero")),
         _task("a token that is a pipe", pipe),
         _refused("a partition with a line break", ["--partition", "a\n#SBATCH --uid=0"], "control characters"),

@@ -37,7 +37,7 @@ def _scenes() -> list[Case]:
         says = r"^error: scene\.toml(:\d+:\d+)?: "
         files: dict[str, Content] = {**_beside(), "scene.toml": content}
         made.append(Case("scene file", name, ["check", "scene.toml"], 3, says, files, signaled=waits))
-    for command in (["render", "scene.toml", "-o", "out/a.png"], ["flipbook", "scene.toml", "--grid", "2x2"], ["simulate", "scene.toml", "--particles", "a.ply"], ["upgrade", "scene.toml"]):
+    for command in (["render", "scene.toml", "-o", "out/a.png"], ["flipbook", "scene.toml", "--grid", "2x2"], ["simulate", "scene.toml", "--particles", "a.ply"]):
         for name, content in (("a pipe", pipe), ("an endless device", link("/dev/zero"))):
             made.append(Case("scene file", f"{command[0]}: {name}", command, 3, r"^error: scene\.toml: ", {"scene.toml": content}, signaled=True))
     if os.geteuid() != 0:
@@ -77,7 +77,6 @@ def _standard_input() -> list[Case]:
         Case("standard input", "two scenes from it", ["check", "-", "-"], (0, 2, 3), r"^error: ", {"scene": FLAME}, stdin="scene"),
         Case("standard input", "render", ["render", "-", "-o", "out/a.png", "--frames", "0", "--threads", "2"], 0, "", {"scene": FLAME}, stdin="scene"),
         Case("standard input", "a plate beside it that is missing", ["check", "-"], 3, r"^error: .*:6:9: plate\.image: .*gone\.png: no such file", {"scene": plates.SCENE.format("gone.png")}, stdin="scene"),
-        Case("standard input", "upgrade", ["upgrade", "-"], (0, 2, 3), r"^error: ", {"scene": FLAME}, stdin="scene"),
     ]
 
 

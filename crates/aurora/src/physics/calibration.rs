@@ -5,7 +5,7 @@ use std::fmt;
 
 use super::{
     atmosphere::{Atmosphere, LEVELS, level_altitude_km},
-    emission::{Emission, Emitter, LINES},
+    emission::{Emission, LINES, SpectralEmitter},
     precipitation::Spectrum,
 };
 use crate::physics::precipitation::spectrum::ARC;
@@ -135,7 +135,7 @@ fn metrics_at(table: &Emission, energy_kev: f64) -> ColumnMetrics {
     let energy_ev = energy_kev * 1e3;
     let profile = table.profile(energy_ev);
     let [green, red, blue, first_positive] = table.column(energy_ev).kilorayleigh;
-    let red_at = |level: usize| profile[level][Emitter::OxygenRed.index()];
+    let red_at = |level: usize| profile[level][SpectralEmitter::OxygenRed.index()];
     let above = (0..LEVELS).filter(|level| level_altitude_km(*level) >= 200.0).map(red_at).sum::<f64>();
     ColumnMetrics {
         energy_kev,
@@ -146,7 +146,7 @@ fn metrics_at(table: &Emission, energy_kev: f64) -> ColumnMetrics {
         red_to_blue: red / blue,
         red_above_200_km: above / (0..LEVELS).map(red_at).sum::<f64>(),
         first_positive_to_green: first_positive / green,
-        red_lifetime: table.column(energy_ev).lifetime[Emitter::OxygenRed.index()],
+        red_lifetime: table.column(energy_ev).lifetime[SpectralEmitter::OxygenRed.index()],
     }
 }
 
@@ -318,7 +318,7 @@ mod tests {
             let energy_kev = row[0].trim_end_matches(" keV").parse().unwrap();
             let metrics = metrics_at(&table, energy_kev);
             let ColumnMetrics { deposition_peak_km, peaks_km, blue_rayleigh, green_to_blue, .. } = metrics;
-            let spread_km = table.column(energy_kev * 1e3).spread_km[Emitter::OxygenRed.index()];
+            let spread_km = table.column(energy_kev * 1e3).spread_km[SpectralEmitter::OxygenRed.index()];
             let found = [
                 deposition_peak_km,
                 peaks_km[0],

@@ -24,7 +24,29 @@ bansho_base::parameters! {
     }
 }
 
+/// Altitude above which an observer has noticeably less air above than one near sea level, km.
+const LOW_KM: f64 = 1.0;
+/// Scale heights of air and of aerosols, km (US Standard Atmosphere 1976; Elterman 1968).
+const AIR_SCALE_HEIGHT_KM: f64 = 8.0;
+const AEROSOL_SCALE_HEIGHT_KM: f64 = 1.2;
+/// Altitude of the middle of the ozone layer and its width, km: the column above falls by a logistic function.
+const OZONE_KM: [f64; 2] = [22.0, 4.5];
+
 impl Extinction {
+    /// What is left of it for an observer at an altitude: the air, the aerosols and the ozone above.
+    #[must_use]
+    pub fn above(&self, altitude_km: f64) -> Self {
+        let height = (altitude_km - LOW_KM).max(0.0);
+        let [middle, width] = OZONE_KM;
+        let ozone_above = |height: f64| 1.0 / (1.0 + math::exp((height - middle) / width));
+        Self {
+            rayleigh: self.rayleigh * math::exp(-height / AIR_SCALE_HEIGHT_KM),
+            aerosol: self.aerosol * math::exp(-height / AEROSOL_SCALE_HEIGHT_KM),
+            ozone: self.ozone * (ozone_above(height) / ozone_above(0.0)),
+            ..self.clone()
+        }
+    }
+
     /// Zenith extinction at a wavelength, magnitudes.
     #[must_use]
     pub fn magnitudes(&self, wavelength_nm: f64) -> f64 {
@@ -56,6 +78,18 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 2e-3, "{degrees}: {found}");
         }
         assert_eq!(air_mass(-0.3), air_mass(0.0));
+    }
+
+    #[test]
+    fn half_of_the_air_is_above_6_km_and_none_above_100() {
+        let air = Extinction::default();
+        assert_eq!(air.above(0.5), air);
+        let half = air.above(LOW_KM + 8.0 * std::f64::consts::LN_2);
+        assert!(
+            (half.rayleigh / air.rayleigh - 0.5).abs() < 1e-12 && half.aerosol < 0.02 && half.ozone > 0.9 * air.ozone
+        );
+        // Even along the horizon.
+        assert!(air.above(100.0).transmittance(427.8, 0.0) > 0.999);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use bansho_base::phenomenon::strip::{AovDescriptor, AovRule};
 
 use super::maps::MAPS;
-use crate::physics::emission::{Emitter, LINES, Line, LineSet};
+use crate::physics::emission::{LINES, Line, LineSet, SpectralEmitter};
 
 /// Wavelengths of the lines that the AOVs measure, nm.
 pub(crate) const MEASURED: [f64; 6] = [557.7, 630.0, 636.4, 427.8, 391.4, 670.5];
@@ -16,14 +16,14 @@ pub(crate) fn measured_lines() -> impl Iterator<Item = &'static Line> {
 }
 
 /// Emitter of each of the [`BRIGHTNESSES`], and its photons per counted photon of the emitter: 0 for lines that are not emitted.
-pub(crate) fn brightnesses(lines: LineSet) -> impl Iterator<Item = (Emitter, f64)> {
+pub(crate) fn brightnesses(lines: LineSet) -> impl Iterator<Item = (SpectralEmitter, f64)> {
     let photons = move |line: &Line| if lines.has(line) { line.photons } else { 0.0 };
     let measured = measured_lines().map(move |line| (line.emitter, photons(line)));
     let first_positive = match lines {
         LineSet::Observed => 1.0,
-        LineSet::Thesis => lines.lines(Emitter::Nitrogen).iter().map(|(_, photons)| photons).sum(),
+        LineSet::Thesis => lines.lines(SpectralEmitter::Nitrogen).iter().map(|(_, photons)| photons).sum(),
     };
-    measured.chain([(Emitter::Nitrogen, first_positive)])
+    measured.chain([(SpectralEmitter::Nitrogen, first_positive)])
 }
 
 const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {

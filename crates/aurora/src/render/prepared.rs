@@ -1,6 +1,9 @@
 //! A prepared frame: builds the charts and samples them for pixels.
 
-use std::{ops::Range, sync::OnceLock};
+use std::{
+    ops::Range,
+    sync::{Arc, OnceLock},
+};
 
 use bansho_base::{
     camera::Camera,
@@ -20,7 +23,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use super::{Blur, maps::CellMaps};
 use crate::{
     Aurora,
-    physics::emission::{Emitter, PerEmitter},
+    physics::emission::{PerEmitter, SpectralEmitter},
     render::{
         aovs::{BRIGHTNESSES, brightnesses},
         bin::{source_bins::SortedSources, sources::Sources},
@@ -57,12 +60,14 @@ pub(crate) struct PreparedAurora<'a> {
     horizon: f32,
     /// Distance of the observer from the Earth's center, km.
     observer_radius: f32,
+    /// Colors of the emitters for this observer.
+    emitter_colors: Arc<EmitterColors>,
     /// Image that pixels sample.
     displayed: DisplayedLight,
     /// Brightness by emitter on the sharp and the soft chart, kept if AOVs are requested.
     measured: Option<[ColumnBuffer; 2]>,
     /// Emitter of each brightness AOV, and its photons per counted photon.
-    brightnesses: Vec<(Emitter, f64)>,
+    brightnesses: Vec<(SpectralEmitter, f64)>,
     /// Created on first use.
     maps: OnceLock<CellMaps<'a>>,
 }
@@ -85,11 +90,12 @@ impl<'a> PreparedAurora<'a> {
         check(observer)?;
         let rendering = &aurora.simulation().parameters().rendering;
         let measured = view.aovs_requested.then(|| [sharp.clone(), soft.clone()]);
+        let emitter_colors = aurora.emitter_colors_above(field.observer_altitude_km());
         let displayed = if rendering.blur_space == Blur::Screen {
             let samplers = [sharp.sampler(), soft.sampler()];
             DisplayedLight::BlurredImage(BlurredImage::new(view, &field, &samplers, &rendering.blur_radii))
         } else {
-            DisplayedLight::Chart(sharp.composite(&soft, &field, aurora.emitter_colors()))
+            DisplayedLight::Chart(sharp.composite(&soft, &field, &emitter_colors))
         };
         // A blur in the picture is computed at one instant.
         let cameras =
@@ -99,9 +105,11 @@ impl<'a> PreparedAurora<'a> {
             view,
             level: bansho_base::math::simd::level(),
             cameras,
-            horizon: -math::sqrt(2.0 * field.observer_altitude_km().max(0.0) / EARTH_RADIUS_KM) as f32,
+            // From above, what the Earth hides is left out of the charts instead.
+            horizon: if field.is_above_light() { -2.0 } else { field.horizon_sine() as f32 },
             observer_radius: (EARTH_RADIUS_KM + field.observer_altitude_km()) as f32,
             field,
+            emitter_colors,
             displayed,
             measured,
             brightnesses: brightnesses(aurora.simulation().emission().lines()).collect(),
@@ -201,10 +209,11 @@ impl PreparedAurora<'_> {
                 colatitudes = [colatitudes[0].min(colatitude), colatitudes[1].max(colatitude)];
             }
         }
-        let size = ((longitudes[1] - longitudes[0]) * math::sin(f64::from(colatitudes[1])) as f32)
-            .max(colatitudes[1] - colatitudes[0]);
-        // Near the magnetic zenith the corners are not a bound.
-        if colatitudes[0] < 4.0 * size || longitudes[1] - longitudes[0] > 0.5 {
+        let sine = colatitudes.map(|colatitude| math::sin(f64::from(colatitude)) as f32);
+        let size = ((longitudes[1] - longitudes[0]) * sine[0].max(sine[1])).max(colatitudes[1] - colatitudes[0]);
+        // Near the magnetic zenith and opposite to it the corners are not a bound.
+        let from_poles = colatitudes[0].min(std::f32::consts::PI - colatitudes[1]);
+        if from_poles < 4.0 * size || longitudes[1] - longitudes[0] > 0.5 {
             return false;
         }
         let bend = 0.5 * size * size / colatitudes[0];
@@ -269,7 +278,7 @@ impl PreparedAurora<'_> {
                 let light = blurred.batch(x, y);
                 for i in 0..PIXEL_BATCH {
                     let position = EmitterColors::table_coordinate(batch.sine[i]);
-                    colors[i] = self.aurora.emitter_colors().attenuated(simd, &light[i], position).into();
+                    colors[i] = self.emitter_colors.attenuated(simd, &light[i], position).into();
                 }
             }
             (DisplayedLight::Chart(_), Some(sampler)) => {
@@ -288,7 +297,8 @@ impl PreparedAurora<'_> {
             let pixels = (batch.sine[i] - self.horizon) * self.view.camera.focal_pixels as f32;
             let above = (pixels + 0.5).clamp(0.0, 1.0) * camera_weight;
             sky[i] = if batch.in_view[i] { above } else { 0.0 };
-            depths[i] = self.depth(batch.sine[i]) / batch.length[i];
+            // Light about the observer is given the depth at which auroras begin.
+            depths[i] = (self.depth(batch.sine[i]) / batch.length[i]).max(DEPTHS.near as f32);
         }
         (sky, depths)
     }
@@ -349,7 +359,12 @@ impl PreparedAurora<'_> {
         const SHELL: f32 = (EARTH_RADIUS_KM + DEPTH_KM) as f32;
         let along = self.observer_radius * sine;
         let squared = along.fma(along, (SHELL - self.observer_radius) * (SHELL + self.observer_radius));
-        1e3 * (squared.max(0.0).sqrt() - along).abs()
+        let half_chord = squared.max(0.0).sqrt();
+        if self.observer_radius < SHELL {
+            return 1e3 * (half_chord - along).abs();
+        }
+        // From above: where the line of sight enters the shell, or is nearest to it.
+        1e3 * (-half_chord - along).max(0.0)
     }
 }
 

@@ -14,7 +14,7 @@ const MOMENT_S: f64 = 1e-3;
 
 /// Particle positions at 100 km altitude, `offset_s` seconds after their step: x east, y up, z south, as for the
 /// camera.
-pub(crate) fn point_cloud(particles: &AuroraParticles, offset_s: f64) -> PointCloud {
+pub(crate) fn point_cloud(particles: &AuroraParticles, offset_s: f64, origin: [f64; 3]) -> PointCloud {
     let offset_s = offset_s.clamp(-AuroraSimulation::STEP_S, AuroraSimulation::STEP_S);
     let [us, ws] = &particles.velocities;
     let position_at = |index: usize, time: f64| {
@@ -22,13 +22,11 @@ pub(crate) fn point_cloud(particles: &AuroraParticles, offset_s: f64) -> PointCl
         on_shell(particles.position(index) + velocity * time)
     };
     let velocity = |index: usize| (position_at(index, MOMENT_S) - position_at(index, -MOMENT_S)) / (2.0 * MOMENT_S);
-    PointCloud {
-        positions: (0..particles.len()).map(|index| position_at(index, offset_s).as_vec3().to_array()).collect(),
-        velocities: (0..particles.len()).map(|index| velocity(index).as_vec3().to_array()).collect(),
-        quantities: [(Quantity::Energy, &particles.energies_ev), (Quantity::Power, &particles.powers_w)]
-            .map(|(quantity, values)| (quantity, values.clone()))
-            .into(),
-    }
+    let positions = (0..particles.len()).map(|index| position_at(index, offset_s).to_array());
+    let velocities = (0..particles.len()).map(|index| velocity(index).as_vec3().to_array()).collect();
+    let quantities = [(Quantity::Energy, &particles.energies_ev), (Quantity::Power, &particles.powers_w)]
+        .map(|(quantity, values)| (quantity, values.clone()));
+    PointCloud::new(origin, positions, velocities, quantities.into())
 }
 
 /// Maps a position of the drawn plane, km, to the spherical shell at 100 km, m.
@@ -54,10 +52,10 @@ mod tests {
             powers_w: vec![2.0, 8.0],
             ..AuroraParticles::default()
         };
-        let cloud = point_cloud(&particles, 0.01);
+        let cloud = point_cloud(&particles, 0.01, [0.0; 3]);
         // 30 m on at 3 km/s; a tenth of a radian along the shell.
         assert!((cloud.positions[0][0] - 30.0).abs() < 1e-2 && (cloud.positions[0][1] - 1e5).abs() < 1e-2);
-        let [x, y, z] = point_cloud(&particles, 0.0).positions[1].map(f64::from);
+        let [x, y, z] = point_cloud(&particles, 0.0, [0.0; 3]).positions[1].map(f64::from);
         assert!((x - 6.471e6 * 0.099_833_42).abs() < 1.0 && (y - (6.471e6 * 0.995_004_17 - 6.371e6)).abs() < 1.0);
         assert_eq!(z, 0.0);
         // East there is downward by the same angle.

@@ -4,8 +4,8 @@
 //!
 //! 1. **Parameters** ([`AbsorberParameters`]): the table of keys with defaults, limits and units. Reading, checking, error messages, the
 //!    schema and `--set` derive from it.
-//! 2. **[`Describe`]**: the key of the table in scene files, and [`Describe::build`], which makes the phenomenon and reports parameters
-//!    that contradict each other, each by its key.
+//! 2. **[`TableKind`]** and **[`PhenomenonTable`]**: the key of the table in scene files, and [`PhenomenonTable::build`], which makes the phenomenon and
+//!    reports parameters that contradict each other, each by its key.
 //! 3. **[`Phenomenon`]**: built once, immutable and shared. It states its name and AOVs and the luminance for automatic exposure, and starts
 //!    runs. Here nothing changes over time, so a run is the phenomenon itself. A simulated phenomenon returns a state of its own, which also
 //!    implements `Stepped`.
@@ -25,10 +25,10 @@ use bansho::base::{
     parameters::{BuildError, ProblemKind, Range},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
-        kind::{BuildContext, Describe},
         strip::{AovDescriptor, AovRule, DepthInterval, Shutter, Strip, View},
         surroundings::{Publication, Surroundings},
     },
+    tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
 bansho::base::parameters! {
@@ -45,8 +45,15 @@ bansho::base::parameters! {
     }
 }
 
-impl Describe for AbsorberParameters {
-    const KEY: &'static str = "absorber";
+impl AbsorberParameters {
+    /// The table `[[absorber]]`.
+    pub(crate) const KIND: TableKind = TableKind::phenomenon::<Self>("absorber");
+}
+
+impl PhenomenonTable for AbsorberParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
         if self.far <= self.near {

@@ -12,10 +12,7 @@ use std::{
 };
 
 use absorber::AbsorberParameters;
-use bansho::{
-    CompiledScene, KINDS, MemoryAssets, Plan, PlanOptions, Scene, Shot, Unobserved,
-    base::{color::luminance, phenomenon::kind::Describe},
-};
+use bansho::{CompiledScene, KINDS, MemoryAssets, Plan, PlanOptions, Scene, Shot, Unobserved, base::color::luminance};
 
 const FLAME: &str = "\
 bansho = 2

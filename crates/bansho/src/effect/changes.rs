@@ -10,13 +10,18 @@ use bansho_base::{
     image::Rect,
     math::DVec3,
     parameters::{Auto, Parameter, Parameters, Range, Reader},
-    phenomenon::kind::{CheckedParameters, Describe},
+    tables::PhenomenonTable,
     world::wind::WindParameters,
 };
+use bansho_environment::lamps::LightParameters;
 use bansho_render::CompiledScene;
-use bansho_scene::{Instance, LightParameters, ParameterProblems, Scene};
+use bansho_scene::{Instance, ParameterProblems, Scene};
 
 use super::{EffectError, LiveEffect};
+
+/// Names of the quantities of [`PhenomenonTable::with_quantity`] that have calls of their own; flames have both.
+const GAS_FLOW: &str = "gas flow";
+const POSITION: &str = "position";
 
 /// Duration in which wind and keyframed parameters reach a new value, s.
 const TRANSITION_S: f64 = 0.25;
@@ -90,10 +95,10 @@ impl LiveEffect {
     /// # Errors
     /// As for [`change_scene`](Self::change_scene).
     pub fn set_lights(&mut self, lights: Vec<LightParameters>) -> Result<(), EffectError> {
-        if self.scene().lights == lights {
+        if self.scene().tables.all::<LightParameters>().eq(&lights) {
             return Ok(());
         }
-        self.change_scene(|scene| scene.lights = lights)
+        self.change_scene(|scene| scene.tables.set_all(lights))
     }
 
     /// Changes what surrounds the phenomena: lights, sky, ground, air, obstacles, camera. What is equal is not built again, and simulations keep their state
@@ -140,7 +145,7 @@ impl LiveEffect {
     }
 
     /// The parameters of the phenomenon `name` that were set last; `None` if there is none of that name and kind.
-    pub fn parameters<P: Describe>(&self, name: &str) -> Option<&P> {
+    pub fn parameters<P: PhenomenonTable>(&self, name: &str) -> Option<&P> {
         let (_, instance) = self.instance(name).ok()?;
         self.target(instance).as_any().downcast_ref()
     }
@@ -153,11 +158,11 @@ impl LiveEffect {
     /// # Errors
     /// There is no phenomenon of that name and kind, a value is out of range or not finite, values contradict each other. The effect is then
     /// unchanged.
-    pub fn set_parameters<P: Describe>(&mut self, name: &str, parameters: P) -> Result<(), EffectError> {
+    pub fn set_parameters<P: PhenomenonTable>(&mut self, name: &str, parameters: P) -> Result<(), EffectError> {
         let (index, instance) = self.instance(name)?;
         if instance.parameters.as_any().downcast_ref::<P>().is_none() {
             let found = instance.kind.key;
-            return Err(EffectError::OtherKind { name: name.to_owned(), found, given: P::KEY });
+            return Err(EffectError::OtherKind { name: name.to_owned(), found, given: parameters.kind().key });
         }
         let changed = instance.with_parameters(parameters)?;
         self.replace(index, changed.parameters, TRANSITION_S)
@@ -190,8 +195,8 @@ impl LiveEffect {
         checked(reader)?;
         let (index, instance) = self.instance(name)?;
         let kind = instance.kind.key;
-        let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: "gas flow" };
-        let changed = self.target(instance).with_flow(flow).ok_or_else(not_changeable)?;
+        let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: GAS_FLOW };
+        let changed = self.target(instance).with_quantity(GAS_FLOW, &[flow]).ok_or_else(not_changeable)?;
         self.replace(index, changed, IGNITION_S)
     }
 
@@ -212,8 +217,8 @@ impl LiveEffect {
         checked(reader)?;
         let (index, instance) = self.instance(name)?;
         let kind = instance.kind.key;
-        let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: "position" };
-        let changed = self.target(instance).with_position(position).ok_or_else(not_changeable)?;
+        let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: POSITION };
+        let changed = self.target(instance).with_quantity(POSITION, &position).ok_or_else(not_changeable)?;
         self.replace(index, changed, seconds)
     }
 
@@ -269,7 +274,7 @@ impl LiveEffect {
     }
 
     /// The parameters of a phenomenon that were set last.
-    fn target<'a>(&'a self, instance: &'a Instance) -> &'a Arc<dyn CheckedParameters> {
+    fn target<'a>(&'a self, instance: &'a Instance) -> &'a Arc<dyn PhenomenonTable> {
         self.targets.get(&instance.name).unwrap_or(&instance.parameters)
     }
 
@@ -277,7 +282,7 @@ impl LiveEffect {
     fn replace(
         &mut self,
         index: usize,
-        target: Arc<dyn CheckedParameters>,
+        target: Arc<dyn PhenomenonTable>,
         transition_s: f64,
     ) -> Result<(), EffectError> {
         let before = &self.scene().instances[index];

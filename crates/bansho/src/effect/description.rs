@@ -5,13 +5,15 @@ use std::{fmt, sync::Arc};
 use bansho_base::{
     camera::CameraParameters,
     host::assets::{Assets, MemoryAssets},
-    parameters::Auto,
-    phenomenon::kind::Describe,
-    world::{air::Air, obstacle::ObstacleParameters, sky::SkyParameters, wind::WindParameters},
+    parameters::{Auto, Parameters},
+    tables::{PhenomenonTable, SharedTable},
+    world::{air::Air, wind::WindParameters},
 };
-use bansho_environment::ground::GroundParameters;
+use bansho_environment::{
+    ground::GroundParameters, lamps::LightParameters, sky::SkyParameters, solids::ObstacleParameters,
+};
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
-use bansho_scene::{Instance, LightParameters, Scene, SceneOptions};
+use bansho_scene::{Instance, Scene, SceneOptions};
 
 use super::{EffectError, LiveEffect, pool::Pool};
 use crate::SceneBuilder;
@@ -64,8 +66,9 @@ enum Source {
 
 impl Effect {
     /// An effect with one phenomenon. Its name is that of its kind, such as `flame_sheet`.
-    pub fn new<P: Describe>(parameters: P) -> Self {
-        Self::from_source(Source::Tables(SceneBuilder::new().phenomenon(P::KEY, &parameters)))
+    pub fn new<P: PhenomenonTable + Parameters>(parameters: P) -> Self {
+        let name = parameters.kind().key;
+        Self::from_source(Source::Tables(SceneBuilder::new().phenomenon(name, &parameters)))
     }
 
     /// An effect that shows a scene, for example one that was read from a file.
@@ -101,7 +104,7 @@ impl Effect {
 
     /// Adds a phenomenon. Names are unique.
     #[must_use]
-    pub fn with<P: Describe>(self, name: &str, parameters: P) -> Self {
+    pub fn with<P: PhenomenonTable + Parameters + Clone>(self, name: &str, parameters: P) -> Self {
         self.change(
             |builder| builder.phenomenon(name, &parameters),
             |scene| scene.instances.push(Instance::new(name, parameters.clone())),
@@ -126,28 +129,34 @@ impl Effect {
         self.change(|builder| builder.air(&parameters), |scene| scene.air = parameters.clone())
     }
 
+    /// Sets a table that all phenomena share; of a kind of which a scene may have many, adds one.
+    #[must_use]
+    pub fn shared(self, parameters: impl SharedTable + Clone) -> Self {
+        self.change(|builder| builder.shared(&parameters), |scene| scene.tables.put(parameters.clone()))
+    }
+
     /// Sets a sky, which lights the phenomena and is drawn behind them if it is visible.
     #[must_use]
     pub fn sky(self, parameters: SkyParameters) -> Self {
-        self.change(|builder| builder.sky(&parameters), |scene| scene.sky = Some(parameters.clone()))
+        self.shared(parameters)
     }
 
     /// Sets a ground.
     #[must_use]
     pub fn ground(self, parameters: GroundParameters) -> Self {
-        self.change(|builder| builder.ground(&parameters), |scene| scene.ground = Some(parameters.clone()))
+        self.shared(parameters)
     }
 
     /// Adds a light.
     #[must_use]
     pub fn light(self, parameters: LightParameters) -> Self {
-        self.change(|builder| builder.light(&parameters), |scene| scene.lights.push(parameters.clone()))
+        self.shared(parameters)
     }
 
     /// Adds a solid obstacle.
     #[must_use]
     pub fn obstacle(self, parameters: ObstacleParameters) -> Self {
-        self.change(|builder| builder.obstacle(&parameters), |scene| scene.obstacles.push(parameters.clone()))
+        self.shared(parameters)
     }
 
     /// Width and height of the picture, pixels: 1 to 16384 each. Without this call it has the size of the scene, 1280 x 720 by default.

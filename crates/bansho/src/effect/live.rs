@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use bansho_base::{
     camera::CameraParameters, frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved,
-    phenomenon::kind::CheckedParameters,
+    tables::PhenomenonTable,
 };
 use bansho_render::{PhenomenonLight, Shot};
 
@@ -29,7 +29,7 @@ pub struct LiveEffect {
     /// Number of changes of parameters so far.
     pub(super) revision: u64,
     /// Parameters that the program has set, by the name of the phenomenon, before they were made to continue earlier ones.
-    pub(super) targets: BTreeMap<String, Arc<dyn CheckedParameters>>,
+    pub(super) targets: BTreeMap<String, Arc<dyn PhenomenonTable>>,
 }
 
 impl fmt::Debug for LiveEffect {

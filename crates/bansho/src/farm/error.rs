@@ -46,6 +46,12 @@ pub enum FarmError {
         /// Why.
         reason: String,
     },
+    /// The plan is not as it was written.
+    #[error("{path}: the plan of tasks was changed after it was written, or is damaged; plan the tasks again", path = .path.display())]
+    PlanChanged {
+        /// The file.
+        path: PathBuf,
+    },
     /// The list of frames in a plan is damaged.
     #[error("the frames of the plan: {0}")]
     PlanFrames(#[from] FrameListError),

@@ -13,14 +13,15 @@ use bansho_media::{
     imageops::{flatten::over_black, label, sprite_sheet::SheetLayout},
     output::{
         frame_file::{self, FrameFileError, LinearPixels},
-        sink::{FrameSlot, Picture},
+        sink::{FinishedPicture, FrameSlot},
     },
     png::{self, PngEffort},
 };
 
-use super::{error::FarmError, plan::FarmFolder, products::Products};
+use super::{error::FarmError, plan::shot_stem, products::Products};
 use crate::job::{
-    FlipbookSummary, Job, JobError, JobObserver, PreparedFlipbook, PreparedJob, render::contact_sheet,
+    FlipbookSummary, Job, JobError, JobObserver, PreparedFlipbook, PreparedJob,
+    render::{contact_sheet, prepare},
     sheet::nearly_square_layout,
 };
 
@@ -30,7 +31,8 @@ use crate::job::{
 /// The name of the film is not that of a film, the contact sheet would be too large, or the flipbook is not possible.
 pub fn check(products: &Products, job: &Job, folder: &Path) -> Result<Option<PreparedFlipbook>, FarmError> {
     if let Some(film) = &products.film {
-        check_name(film)?;
+        let kind = check_name(film)?.kind();
+        prepare::check_view(job.view, kind, film).map_err(JobError::from)?;
     }
     if let Some(count) = products.contact_sheet {
         sheet_layout(&job.prepare()?, count)?;
@@ -80,7 +82,7 @@ pub fn make(
 
 /// The contact sheet of the frames at `output`: `shot/fire.sheet.png` of `shot/fire.####.exr`.
 pub fn contact_sheet_path(output: &Path) -> PathBuf {
-    FarmFolder::beside(output).root().with_extension("sheet.png")
+    output.with_file_name(format!("{}.sheet.png", shot_stem(output)))
 }
 
 /// The layout of a contact sheet of up to `count` frames.
@@ -106,9 +108,10 @@ pub fn make_contact_sheet(whole: &PreparedJob, count: usize, observer: &dyn Obse
         tiles.push(tile);
     }
     let sheet = contact_sheet::compose(&tiles, &layout).map_err(JobError::from)?;
-    let path = contact_sheet_path(&whole.output().template_path());
+    let output = whole.output();
+    let path = output.path(whole.frames()[0]).with_file_name(format!("{}.sheet.png", output.stem()));
     let bytes = png::encode(&sheet, &[0; 32], PngEffort::Fast, &path)?;
-    Ok(atomic::write_bytes_with(&path, &bytes, &whole.format.overwrite)?)
+    Ok(atomic::write_bytes(&path, &bytes, &whole.format.overwrite)?)
 }
 
 /// Checks that `path` is the name of a film.
@@ -137,7 +140,7 @@ pub fn make_film(whole: &PreparedJob, path: &Path, observer: &dyn Observer) -> R
         observer::check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a film" })?;
         let slot = FrameSlot { index, number };
         let picture = display_picture(whole, number, sink.picture_format(), observer)?;
-        sink.write(slot, Picture::Display(&picture, &[0; 32]))?;
+        sink.write(slot, FinishedPicture::Display(&picture, &[0; 32]))?;
     }
     Ok(sink.finish()?)
 }

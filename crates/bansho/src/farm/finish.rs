@@ -12,7 +12,7 @@ use bansho_media::{
     format::OutputKind,
     output::{
         frame_file::{self, LinearPixels},
-        sink::{FrameSlot, Picture},
+        sink::{FinishedPicture, FrameSlot},
     },
 };
 use rayon::prelude::*;
@@ -136,12 +136,12 @@ fn join_frame(whole: &PreparedJob, number: i64, tiles: [usize; 2], paths: &[Path
             let read = |path: &PathBuf| frame_file::read_exr(path).map_err(unreadable(path));
             let parts = paths.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
             let frame = join_linear(whole, number, fingerprint, &rects, parts);
-            sink.write(slot, Picture::Linear(&frame))?;
+            sink.write(slot, FinishedPicture::Linear(&frame))?;
         }
         _ => {
             let read = |path: &PathBuf| frame_file::read_png(path).map_err(unreadable(path));
             let parts = paths.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
-            sink.write(slot, Picture::Display(&join_display(size, &rects, parts), &fingerprint))?;
+            sink.write(slot, FinishedPicture::Display(&join_display(size, &rects, parts), &fingerprint))?;
         }
     }
     Ok(sink.finish()?)
@@ -158,6 +158,7 @@ fn paste<T: Copy>(whole: &mut [T], width: usize, rect: Rect, part: &[T]) {
 fn join_display(size: [usize; 2], rects: &[Rect], parts: Vec<DisplayImage>) -> DisplayImage {
     let [width, height] = size;
     let (opaque, alpha) = parts.first().map_or((true, Default::default()), |part| (part.opaque, part.alpha));
+    let encoding = parts.first().map(|part| part.encoding).unwrap_or_default();
     let is_sixteen = parts.iter().any(|part| matches!(part.pixels, DisplayPixels::Sixteen(_)));
     let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
     if is_sixteen {
@@ -173,7 +174,7 @@ fn join_display(size: [usize; 2], rects: &[Rect], parts: Vec<DisplayImage>) -> D
         }
     }
     let pixels = if is_sixteen { DisplayPixels::Sixteen(sixteen) } else { DisplayPixels::Eight(eight) };
-    DisplayImage { width, height, opaque, alpha, pixels }
+    DisplayImage { width, height, opaque, alpha, encoding, pixels }
 }
 
 fn join_linear(
@@ -211,7 +212,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        farm::{chunks::ChunkGrid, plan::PlanOptions, products::FlipbookRequest, task::chunk_job},
+        farm::{chunks::ChunkGrid, plan::FarmPlanOptions, products::FlipbookRequest, task::chunk_job},
         job::{Flipbook, FlipbookCrop, OptionError, SceneFile},
     };
 
@@ -227,7 +228,7 @@ mod tests {
         let prepared = job.prepare().unwrap();
         let grid = ChunkGrid::new(0, 2, prepared.frames().to_vec());
         let digests = (0..grid.count()).map(|chunk| prepared.shot_digest(grid.chunk(chunk))).collect();
-        let options = PlanOptions { folder: folder.to_path_buf(), tiles, ..PlanOptions::default() };
+        let options = FarmPlanOptions { folder: folder.to_path_buf(), tiles, ..FarmPlanOptions::default() };
         (job, farm, FarmPlan::new(options, &grid, 0, 2, digests))
     }
 

@@ -22,7 +22,7 @@ pub fn task_name(task: usize) -> String {
 /// A line of a journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "lowercase")]
-pub enum Event {
+pub enum JournalEvent {
     /// The task begins.
     Start {
         /// The name of the machine.
@@ -87,7 +87,7 @@ impl Journal {
     ///
     /// # Errors
     /// It cannot be written. Frames do not depend on it.
-    pub fn write(&self, event: &Event) -> io::Result<()> {
+    pub fn write(&self, event: &JournalEvent) -> io::Result<()> {
         let line = format!("{}\n", serde_json::to_string(event)?);
         self.file.lock().unwrap_or_else(PoisonError::into_inner).write_all(line.as_bytes())
     }
@@ -119,12 +119,12 @@ impl Attempt {
         // A line that was cut by a full disk or a kill is left out.
         for event in text.lines().filter_map(|line| serde_json::from_str(line).ok()) {
             match event {
-                Event::Start { node, token, .. } => (attempt.node, attempt.token) = (node, token),
-                Event::Frame { seconds, .. } => {
+                JournalEvent::Start { node, token, .. } => (attempt.node, attempt.token) = (node, token),
+                JournalEvent::Frame { seconds, .. } => {
                     attempt.drawn += 1;
                     attempt.seconds = seconds;
                 }
-                Event::End { code, message, seconds, cpu_seconds } => {
+                JournalEvent::End { code, message, seconds, cpu_seconds } => {
                     (attempt.code, attempt.message) = (Some(code), message);
                     (attempt.seconds, attempt.cpu_seconds) = (seconds, cpu_seconds);
                 }
@@ -160,8 +160,8 @@ pub fn read(folder: &Path) -> Attempts {
 mod tests {
     use super::*;
 
-    fn start() -> Event {
-        Event::Start { node: "n1".into(), token: "t".into(), frames: 3, kept: 1, threads: 2 }
+    fn start() -> JournalEvent {
+        JournalEvent::Start { node: "n1".into(), token: "t".into(), frames: 3, kept: 1, threads: 2 }
     }
 
     #[test]
@@ -171,11 +171,12 @@ mod tests {
         for attempt in 0..11 {
             let journal = Journal::create(folder.path(), "task-7").unwrap();
             journal.write(&start()).unwrap();
-            journal.write(&Event::Frame { number: 3, seconds: f64::from(attempt) }).unwrap();
+            journal.write(&JournalEvent::Frame { number: 3, seconds: f64::from(attempt) }).unwrap();
         }
         let last = Journal::create(folder.path(), "task-7").unwrap();
         last.write(&start()).unwrap();
-        let end = Event::End { code: 143, message: Some("stopped".into()), seconds: 9.5, cpu_seconds: Some(12.0) };
+        let end =
+            JournalEvent::End { code: 143, message: Some("stopped".into()), seconds: 9.5, cpu_seconds: Some(12.0) };
         last.write(&end).unwrap();
         fs::write(
             folder.path().join("task-8.0.jsonl"),

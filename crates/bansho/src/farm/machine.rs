@@ -6,7 +6,8 @@ use bansho_base::host::{assets::MemoryAssets, observer::Observer};
 use bansho_media::files::{
     atomic,
     input::{self, InputError},
-    provenance::PROGRAM,
+    overwrite_policy::OverwritePolicy,
+    provenance::{COMMENT_LINE, PROGRAM},
 };
 use bansho_render::{Plan, PlanOptions, Shot};
 
@@ -62,8 +63,15 @@ pub fn arithmetic_digest(observer: &dyn Observer) -> Result<String, FarmError> {
 /// There is another token, or none.
 pub fn check_token(path: PathBuf, expected: &str) -> Result<(), FarmError> {
     let found = match input::read(&path, TOKEN_BYTES) {
-        Ok(bytes) if bytes.trim_ascii_end() == expected.as_bytes() => return Ok(()),
-        Ok(bytes) => format!("`{}`", String::from_utf8_lossy(bytes.trim_ascii_end())),
+        Ok(bytes) => {
+            // After the line that marks the file, which may be of another version.
+            let text = String::from_utf8_lossy(&bytes);
+            let token = text.trim_end().lines().last().unwrap_or_default();
+            if token == expected {
+                return Ok(());
+            }
+            format!("`{token}`")
+        }
         Err(InputError::Io(error)) if error.kind() == io::ErrorKind::NotFound => "no file".to_owned(),
         Err(source) => return Err(FarmError::Input { path, source }),
     };
@@ -127,7 +135,7 @@ impl TaskCheck<'_> {
     }
 
     fn record_of(plan: &FarmPlan) -> String {
-        format!("{} {} {}\n", plan.token, plan.arithmetic, plan.program)
+        format!("{COMMENT_LINE}{} {} {}\n", plan.token, plan.arithmetic, plan.program)
     }
 
     /// Whether a task of this plan has already found that this machine may work on it. The picture takes more time than all else before the first frame.
@@ -140,7 +148,8 @@ impl TaskCheck<'_> {
     fn record(&self, plan: &FarmPlan) {
         if let Some(path) = self.record_path() {
             // Without it, as on a full disk, the next task draws the picture once more.
-            let _ = atomic::write_bytes(&path, Self::record_of(plan).as_bytes());
+            let policy = OverwritePolicy::default().without_links();
+            let _ = atomic::write_bytes(&path, Self::record_of(plan).as_bytes(), &policy);
         }
     }
 }
@@ -173,15 +182,17 @@ mod tests {
         assert!(matches!(check.token(), Err(FarmError::Token { found, .. }) if found == "no file"));
         let arithmetic = arithmetic_digest(&Unobserved).unwrap();
         let good = FarmPlan { arithmetic, ..plan() };
-        folder.write_plan(&good).unwrap();
+        folder.write_plan(&good, &OverwritePolicy::default()).unwrap();
         check.token().unwrap();
         assert_eq!(check.plan(&Unobserved).unwrap(), good);
         let other = TaskCheck { token: "4567", ..check };
         assert!(matches!(other.token(), Err(FarmError::Token { found, .. }) if found == "`0123`"));
         assert!(matches!(other.plan(&Unobserved), Err(FarmError::PlanReplaced)));
-        folder.write_plan(&FarmPlan { program: "Bansho 0.0.1".into(), ..good.clone() }).unwrap();
+        folder
+            .write_plan(&FarmPlan { program: "Bansho 0.0.1".into(), ..good.clone() }, &OverwritePolicy::default())
+            .unwrap();
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Version { .. })));
-        folder.write_plan(&FarmPlan { arithmetic: "00".into(), ..good }).unwrap();
+        folder.write_plan(&FarmPlan { arithmetic: "00".into(), ..good }, &OverwritePolicy::default()).unwrap();
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Arithmetic)));
     }
 
@@ -192,7 +203,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let folder = FarmFolder::new(root.path().to_path_buf());
         let good = FarmPlan { arithmetic: arithmetic_digest(&Unobserved).unwrap(), ..plan() };
-        folder.write_plan(&good).unwrap();
+        folder.write_plan(&good, &OverwritePolicy::default()).unwrap();
         let draws = |token: &str, machine: Option<&str>| {
             let observer = crate::job::testing::RecordingObserver::default();
             TaskCheck { folder: &folder, token, machine }.plan(&observer).unwrap();
@@ -203,12 +214,12 @@ mod tests {
         assert!(draws("0123", Some("b-2")), "another machine");
         assert!(draws("0123", None) && draws("0123", None), "one that is not known");
         assert!(draws("0123", Some("../x")) && !root.path().join("x").exists());
-        folder.write_plan(&FarmPlan { token: "4567".into(), ..good.clone() }).unwrap();
+        folder.write_plan(&FarmPlan { token: "4567".into(), ..good.clone() }, &OverwritePolicy::default()).unwrap();
         assert!(draws("4567", Some("a-1")), "another plan");
-        folder.write_plan(&FarmPlan { arithmetic: "00".into(), ..good.clone() }).unwrap();
+        folder.write_plan(&FarmPlan { arithmetic: "00".into(), ..good.clone() }, &OverwritePolicy::default()).unwrap();
         let check = TaskCheck { folder: &folder, token: "0123", machine: Some("b-2") };
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Arithmetic)));
-        folder.write_plan(&FarmPlan { program: "Bansho 0.0.1".into(), ..good }).unwrap();
+        folder.write_plan(&FarmPlan { program: "Bansho 0.0.1".into(), ..good }, &OverwritePolicy::default()).unwrap();
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Version { .. })));
     }
 }

@@ -1,9 +1,10 @@
 //! A job template of Open Job Description (`jobtemplate-2023-09` with the extension `TASK_CHUNKING`) for schedulers such as AWS Deadline Cloud: a check,
 //! snapshots, chunks of frames, and a last step, each after the one before it. There is no plan: whoever submits the template may choose other frames, sizes
-//! and paths, and its commands are told all of them.
+//! and paths, and they are passed to its commands.
 
 use std::{fmt::Write, path::Path};
 
+use bansho_media::files::provenance::COMMENT_LINE;
 use serde_json::Value;
 
 use super::{error::FarmError, products::Products, task::script_path};
@@ -145,7 +146,7 @@ fn action(indent: &str, arguments: &[String]) -> String {
 pub fn template(options: &TemplateOptions) -> Result<String, FarmError> {
     let name: String = options.name.chars().take(MAX_NAME).collect();
     let text = format!(
-        "specificationVersion: {SPECIFICATION}\nextensions: [TASK_CHUNKING]\nname: {}\nparameterDefinitions:\n",
+        "{COMMENT_LINE}specificationVersion: {SPECIFICATION}\nextensions: [TASK_CHUNKING]\nname: {}\nparameterDefinitions:\n",
         literal(&name)?
     );
     let mut template = Template { text };

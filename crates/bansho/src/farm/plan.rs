@@ -8,7 +8,9 @@ use std::{
 use bansho_media::files::{
     atomic,
     input::{self, InputError},
-    provenance::PROGRAM,
+    naming::OutputPattern,
+    overwrite_policy::OverwritePolicy,
+    provenance::{COMMENT_LINE, PROGRAM},
 };
 use serde::{Deserialize, Serialize};
 
@@ -20,11 +22,23 @@ use super::{
 use crate::job::frames;
 
 /// Value of `"format"` in the file of a plan.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Largest file of a plan that is read, bytes: some ten million frames in as many ranges.
 const PLAN_BYTES: u64 = 256 << 20;
 /// Most columns and rows of tiles.
 const MAX_TILES: usize = 4096;
+
+/// Names of all scripts.
+const SCRIPT_NAMES: [&str; 5] = ["check.sbatch", "snapshots.sbatch", "frames.sbatch", "finish.sbatch", "submit.sh"];
+
+/// A file to be written to the folder of the plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Script {
+    /// Its name: `check.sbatch`, `snapshots.sbatch`, `frames.sbatch`, `finish.sbatch` or `submit.sh`.
+    pub name: &'static str,
+    /// Its text.
+    pub text: String,
+}
 
 /// How a shot is cut into tasks. Chunk `c` and tile `t` of `n` tiles are task `c n + t`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,9 +73,15 @@ pub struct FarmPlan {
     pub costs: ShotCosts,
 }
 
+/// What is read first of a plan, which may be of another version.
+#[derive(Deserialize)]
+struct PlanFormat {
+    format: u32,
+}
+
 /// What of a plan does not follow from the shot.
 #[derive(Clone, Debug, Default)]
-pub struct PlanOptions {
+pub struct FarmPlanOptions {
     /// A random word.
     pub token: String,
     /// Digest of the arithmetic of this machine.
@@ -83,13 +103,13 @@ pub struct PlanOptions {
 impl FarmPlan {
     /// The plan of the tasks of `grid`, whose chunks have `digests`.
     pub fn new(
-        options: PlanOptions,
+        options: FarmPlanOptions,
         grid: &ChunkGrid,
         first_frame: i64,
         chunk_frames: u64,
         digests: Vec<String>,
     ) -> Self {
-        let PlanOptions { token, arithmetic, folder, arguments, tiles, snapshots, products, costs } = options;
+        let FarmPlanOptions { token, arithmetic, folder, arguments, tiles, snapshots, products, costs } = options;
         Self {
             format: FORMAT,
             program: PROGRAM.to_owned(),
@@ -127,6 +147,18 @@ impl FarmPlan {
     }
 }
 
+/// The name of the shot whose frames are at `output`.
+pub(crate) fn shot_stem(output: &Path) -> String {
+    match OutputPattern::parse(output, 2) {
+        Ok(pattern) => pattern.stem().to_owned(),
+        // What uses the name has reported it.
+        Err(_) => {
+            let name = output.file_name().unwrap_or_default().to_string_lossy();
+            name.chars().take_while(|c| !matches!(c, '.' | '#' | '%')).collect()
+        }
+    }
+}
+
 /// The folder of a plan, beside the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FarmFolder {
@@ -141,9 +173,7 @@ impl FarmFolder {
 
     /// The folder for the frames at `output`, such as `shot/fire.####.exr`: `shot/fire.farm`.
     pub fn beside(output: &Path) -> Self {
-        let name = output.file_name().unwrap_or_default().to_string_lossy();
-        let stem: String = name.chars().take_while(|c| !matches!(c, '.' | '#' | '%')).collect();
-        Self::new(output.with_file_name(format!("{stem}.farm")))
+        Self::new(output.with_file_name(format!("{}.farm", shot_stem(output))))
     }
 
     /// The folder itself.
@@ -196,6 +226,35 @@ impl FarmFolder {
         self.root.join("tiles").join(tile.to_string())
     }
 
+    /// Checks that what planning writes to the folder does not replace anything else: before what may take long.
+    ///
+    /// # Errors
+    /// A file of one of its names is there that must not be replaced, or a link.
+    pub fn check_files(&self, policy: &OverwritePolicy) -> Result<(), FarmError> {
+        let policy = policy.clone().without_links();
+        let scripts = SCRIPT_NAMES.map(|name| self.root.join(name));
+        let files = [self.plan(), self.token(), self.jobs()].into_iter().chain(scripts);
+        Ok(files.into_iter().try_for_each(|path| atomic::check(&path, &policy))?)
+    }
+
+    /// Writes a script into the folder.
+    ///
+    /// # Errors
+    /// It cannot be written, or something else has its name.
+    pub fn write_script(&self, script: &Script, policy: &OverwritePolicy) -> Result<(), FarmError> {
+        let policy = policy.clone().without_links();
+        Ok(atomic::write_bytes(&self.root.join(script.name), script.text.as_bytes(), &policy)?)
+    }
+
+    /// Leaves the token of a template of Open Job Description.
+    ///
+    /// # Errors
+    /// It cannot be written, or something else has its name.
+    pub fn write_template_token(&self, token: &str) -> Result<(), FarmError> {
+        let policy = OverwritePolicy::default().without_links();
+        Ok(atomic::write_bytes(&self.template_token(), token_text(token).as_bytes(), &policy)?)
+    }
+
     /// Reads the plan.
     ///
     /// # Errors
@@ -209,12 +268,16 @@ impl FarmFolder {
             Err(source) => return Err(FarmError::Input { path, source }),
             Ok(bytes) => bytes,
         };
-        let plan: FarmPlan = serde_json::from_slice(&bytes)
-            .map_err(|error| FarmError::PlanFormat { path: path.clone(), reason: error.to_string() })?;
-        if plan.format != FORMAT {
-            let reason = format!("its format is {}; allowed: {FORMAT}", plan.format);
+        let text = String::from_utf8_lossy(&bytes);
+        if let Ok(PlanFormat { format }) = serde_json::from_str(&text)
+            && format != FORMAT
+        {
+            let reason = format!("its format is {format}; allowed: {FORMAT}");
             return Err(FarmError::PlanFormat { path, reason });
         }
+        let Some(object) = unsigned(&text) else { return Err(FarmError::PlanChanged { path }) };
+        let plan: FarmPlan = serde_json::from_str(&object)
+            .map_err(|error| FarmError::PlanFormat { path: path.clone(), reason: error.to_string() })?;
         if plan.tiles.iter().any(|side| !(1..=MAX_TILES).contains(side)) || plan.digests.len() != plan.grid()?.count() {
             let reason = "its numbers of tiles and chunks do not fit".to_owned();
             return Err(FarmError::PlanFormat { path, reason });
@@ -226,16 +289,43 @@ impl FarmFolder {
     ///
     /// # Errors
     /// A file or folder cannot be written.
-    pub fn write_plan(&self, plan: &FarmPlan) -> Result<(), FarmError> {
+    pub fn write_plan(&self, plan: &FarmPlan, policy: &OverwritePolicy) -> Result<(), FarmError> {
         for path in [self.journal(), self.logs()] {
             fs::create_dir_all(&path).map_err(|source| FarmError::Io { path, source })?;
         }
         let text = serde_json::to_string_pretty(plan)
             .map_err(|error| FarmError::PlanFormat { path: self.plan(), reason: error.to_string() })?;
-        atomic::write_bytes(&self.plan(), format!("{text}\n").as_bytes())?;
-        // Last: whoever sees the token sees the plan, too.
-        Ok(atomic::write_bytes(&self.token(), format!("{}\n", plan.token).as_bytes())?)
+        // Both before any is written, so that either all is of this plan or nothing.
+        let policy = policy.clone().without_links();
+        let files = [(self.plan(), signed(&text)), (self.token(), token_text(&plan.token))];
+        files.iter().try_for_each(|(path, _)| atomic::check(path, &policy))?;
+        // The token last: whoever sees it sees the plan, too.
+        Ok(files.iter().try_for_each(|(path, text)| atomic::write_bytes(path, text.as_bytes(), &policy))?)
     }
+}
+
+/// The text of a token file.
+fn token_text(token: &str) -> String {
+    format!("{COMMENT_LINE}{token}\n")
+}
+
+/// What stands before the digest of a plan, which is its last entry.
+const DIGEST_KEY: &str = ",\n  \"digest\": \"";
+/// What stands after it.
+const DIGEST_END: &str = "\"\n}\n";
+
+/// A JSON object with the digest of all that stands before it.
+fn signed(object: &str) -> String {
+    let start = object.trim_end().trim_end_matches('}').trim_end();
+    let digest = blake3::hash(start.as_bytes()).to_hex();
+    format!("{start}{DIGEST_KEY}{digest}{DIGEST_END}")
+}
+
+/// The JSON object in a text of [`signed`], without its digest. `None` if the text is another one now.
+fn unsigned(text: &str) -> Option<String> {
+    let (start, rest) = text.rsplit_once(DIGEST_KEY)?;
+    let digest = rest.strip_suffix(DIGEST_END)?;
+    (digest == blake3::hash(start.as_bytes()).to_hex().as_str()).then(|| format!("{start}\n}}\n"))
 }
 
 #[cfg(test)]
@@ -244,13 +334,13 @@ pub(crate) mod tests {
 
     pub(crate) fn plan() -> FarmPlan {
         let grid = ChunkGrid::new(0, 4, (0..10).collect());
-        let options = PlanOptions {
+        let options = FarmPlanOptions {
             token: "0123".into(),
             arithmetic: "ab".into(),
             folder: "/shots".into(),
             arguments: vec!["fire.toml".into(), "--size=8x8".into()],
             tiles: [1, 1],
-            ..PlanOptions::default()
+            ..FarmPlanOptions::default()
         };
         FarmPlan::new(options, &grid, 0, 4, vec![String::new(); grid.count()])
     }
@@ -260,25 +350,53 @@ pub(crate) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let farm = FarmFolder::new(folder.path().join("a.farm"));
         assert!(matches!(farm.read_plan(), Err(FarmError::NoPlan { .. })));
-        farm.write_plan(&plan()).unwrap();
+        farm.write_plan(&plan(), &OverwritePolicy::default()).unwrap();
         let read = farm.read_plan().unwrap();
         assert_eq!(read, plan());
         assert_eq!((read.grid().unwrap().chunk(2), read.task_count()), (&[8, 9][..], 3));
-        assert!(bansho_media::files::provenance::is_bansho_file(&farm.plan()));
+        for file in [farm.plan(), farm.token()] {
+            assert!(bansho_media::files::provenance::is_bansho_file(&file), "{}", file.display());
+        }
+    }
+
+    #[test]
+    fn a_plan_that_was_edited_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let farm = FarmFolder::new(folder.path().to_path_buf());
+        farm.write_plan(&plan(), &OverwritePolicy::default()).unwrap();
+        let whole = fs::read_to_string(farm.plan()).unwrap();
+        for (from, to) in [
+            ("--size=8x8", "--out=/elsewhere/a.png"),
+            ("\"/shots\"", "\"/\""),
+            ("\"film\": null", "\"film\": \"/elsewhere/a.gif\""),
+            ("\n  \"tiles\"", "\n   \"tiles\""),
+            ("\"digest\": \"", "\"digest\": \"0"),
+        ] {
+            let edited = whole.replace(from, to);
+            assert_ne!(edited, whole, "{from}");
+            fs::write(farm.plan(), edited).unwrap();
+            let error = farm.read_plan().unwrap_err();
+            assert!(matches!(error, FarmError::PlanChanged { .. }), "{from}: {error}");
+        }
+        fs::write(farm.plan(), whole).unwrap();
+        farm.read_plan().unwrap();
     }
 
     #[test]
     fn damaged_plans_and_those_of_other_formats_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let farm = FarmFolder::new(folder.path().to_path_buf());
-        farm.write_plan(&plan()).unwrap();
+        farm.write_plan(&plan(), &OverwritePolicy::default()).unwrap();
         let whole = fs::read_to_string(farm.plan()).unwrap();
+        for bad in [&whole[..whole.len() / 2], "", "[]"] {
+            fs::write(farm.plan(), bad).unwrap();
+            assert!(matches!(farm.read_plan(), Err(FarmError::PlanChanged { .. })), "{bad}");
+        }
+        let object = unsigned(&whole).unwrap();
         for bad in [
-            &whole[..whole.len() / 2],
-            "",
-            "[]",
-            &whole.replace("\"format\": 1", "\"format\": 2"),
-            &whole.replace("\"chunk_frames\": 4", "\"chunk_frames\": 3"),
+            &whole.replace("\"format\": 2", "\"format\": 1"),
+            &signed(&object.replace("\"chunk_frames\": 4", "\"chunk_frames\": 3")),
+            &signed(&object.replace("chunk_frames", "pieces")),
         ] {
             fs::write(farm.plan(), bad).unwrap();
             assert!(matches!(farm.read_plan(), Err(FarmError::PlanFormat { .. })), "{bad}");
@@ -292,6 +410,8 @@ pub(crate) mod tests {
             ("fire_%04d.png", "fire_.farm"),
             ("out/a/a.png", "out/a/a.farm"),
             ("####.png", ".farm"),
+            ("a%#b.####.png", "a#b.farm"),
+            ("50%%.####.png", "50%.farm"),
         ] {
             assert_eq!(FarmFolder::beside(Path::new(output)).root(), Path::new(folder));
         }

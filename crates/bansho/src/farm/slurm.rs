@@ -2,10 +2,12 @@
 
 use std::{fmt::Write, path::Path};
 
+use bansho_media::files::provenance::COMMENT_LINE;
+
 use super::{
     chunks::ChunkGrid,
     error::FarmError,
-    plan::{FarmFolder, FarmPlan},
+    plan::{FarmFolder, FarmPlan, Script},
     task::{check_printable, script_path},
 };
 use crate::job::frames::format_list;
@@ -27,15 +29,6 @@ pub struct SlurmOptions {
     pub finish_memory_bytes: f64,
     /// Further options of `sbatch` for all jobs, such as `--account=films`.
     pub sbatch: Vec<String>,
-}
-
-/// A file to be written to the folder of the plan.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Script {
-    /// Its name.
-    pub name: &'static str,
-    /// Its text.
-    pub text: String,
 }
 
 /// Largest number of machines that look at the shared folder before the array starts; as many as are free are taken.
@@ -110,7 +103,7 @@ impl Writer<'_> {
         ];
         directives.extend(self.options.partition.iter().map(|partition| format!("--partition={partition}")));
         directives.extend(options.iter().chain(&self.options.sbatch).cloned());
-        let mut text = "#!/bin/sh\n".to_owned();
+        let mut text = format!("#!/bin/sh\n{COMMENT_LINE}");
         for directive in directives {
             check_printable(&directive)?;
             let _ = writeln!(text, "#SBATCH {directive}");
@@ -236,8 +229,10 @@ pub fn scripts(
 /// Submits each job after the one before it. If Slurm refuses one, those before it are canceled.
 fn submit_script(jobs: &[(&str, Script)], root: &Path) -> Result<Script, FarmError> {
     let mut text = format!(
-        "#!/bin/sh\n# Submits the jobs to Slurm, each to begin when the one before it has succeeded, and prints their numbers.\n\
-         set -eu\ncd {}\nids=\n\
+        "#!/bin/sh\n{COMMENT_LINE}# Submits the jobs to Slurm, each to begin when the one before it has succeeded, and prints their numbers.\n\
+         set -eu\ncd {}\n\
+         if test -h jobs || {{ test -s jobs && ! head -n 1 jobs | grep -q '^# bansho:'; }}; then\n  \
+         echo 'jobs: is there already and was not made by Bansho' >&2\n  exit 1\nfi\nids=\n\
          cancel() {{ test -z \"$ids\" || scancel $ids; }}\ntrap cancel EXIT\n",
         quoted(&script_path(root)?)
     );
@@ -255,11 +250,11 @@ fn submit_script(jobs: &[(&str, Script)], root: &Path) -> Result<Script, FarmErr
         );
         (*name).clone_into(&mut previous);
     }
-    text += "trap - EXIT\n{\n";
+    let _ = write!(text, "trap - EXIT\nrm -f jobs\nset -C\n{{\necho '{}'\n", COMMENT_LINE.trim_end());
     for (name, _) in jobs {
         let _ = writeln!(text, "echo \"{name} ${name}\"");
     }
-    text += "} | tee jobs\n";
+    text += "} > jobs\nsed 1d jobs\n";
     Ok(Script { name: "submit.sh", text })
 }
 

@@ -135,6 +135,11 @@ impl FarmStatus {
     }
 }
 
+/// The job of all frames of `grid`, to ask for their states: a file that Bansho did not make is no obstacle, since nothing is written.
+fn asking(job: &Job, grid: &ChunkGrid) -> Job {
+    Job { frames: Some(grid.frames().to_vec()), overwrite: true, ..job.clone() }
+}
+
 /// The state of each frame of each task, in the order of tasks.
 ///
 /// # Errors
@@ -143,7 +148,7 @@ pub fn task_states(job: &Job, folder: &FarmFolder, plan: &FarmPlan) -> Result<Ve
     let (grid, tiles) = (plan.grid()?, plan.tile_count());
     let mut of_tasks = vec![Vec::new(); plan.task_count()];
     for tile in 0..tiles {
-        let job = Job { frames: Some(grid.frames().to_vec()), ..task::tile_job(job, folder, plan.tiles, tile)? };
+        let job = asking(&task::tile_job(job, folder, plan.tiles, tile)?, &grid);
         let mut states = job.prepare()?.frame_states().into_iter();
         for chunk in 0..grid.count().min(plan.digests.len()) {
             of_tasks[chunk * tiles + tile] = states.by_ref().take(grid.chunk(chunk).len()).collect();
@@ -183,7 +188,7 @@ pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan, queue: Option<&Qu
     let (grid, tiles) = (plan.grid()?, plan.tile_count());
     let attempts = journal::read(&folder.journal());
     let states = task_states(job, folder, plan)?;
-    let whole_job = Job { frames: Some(grid.frames().to_vec()), ..job.clone() };
+    let whole_job = asking(job, &grid);
     let frames = match tiles {
         1 => FrameCounts::of(&states.concat()),
         // Tiles count only when they are joined.
@@ -275,10 +280,12 @@ fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan, que
 mod tests {
     use std::fs;
 
+    use bansho_media::files::overwrite_policy::OverwritePolicy;
+
     use super::*;
     use crate::{
         farm::{
-            journal::Event,
+            journal::JournalEvent,
             plan::tests::plan,
             products::{FlipbookRequest, Products},
         },
@@ -297,16 +304,16 @@ mod tests {
         let prepared = job.prepare().unwrap();
         let digests = (0..3).map(|chunk| prepared.shot_digest(plan.grid().unwrap().chunk(chunk))).collect();
         let plan = FarmPlan { digests, ..plan };
-        farm.write_plan(&plan).unwrap();
+        farm.write_plan(&plan, &OverwritePolicy::default()).unwrap();
         (job, farm, plan)
     }
 
-    fn start(plan: &FarmPlan) -> Event {
-        Event::Start { node: "n1".into(), token: plan.token.clone(), frames: 4, kept: 0, threads: 1 }
+    fn start(plan: &FarmPlan) -> JournalEvent {
+        JournalEvent::Start { node: "n1".into(), token: plan.token.clone(), frames: 4, kept: 0, threads: 1 }
     }
 
-    fn end(code: u8, message: &str) -> Event {
-        Event::End { code, message: Some(message.into()), seconds: 8.0, cpu_seconds: None }
+    fn end(code: u8, message: &str) -> JournalEvent {
+        JournalEvent::End { code, message: Some(message.into()), seconds: 8.0, cpu_seconds: None }
     }
 
     #[test]
@@ -371,7 +378,7 @@ mod tests {
         for task in 0..2 {
             let journal = journal::Journal::create(&farm.journal(), &journal::task_name(task)).unwrap();
             journal.write(&start(&plan)).unwrap();
-            journal.write(&Event::Frame { number: 0, seconds: 6.0 }).unwrap();
+            journal.write(&JournalEvent::Frame { number: 0, seconds: 6.0 }).unwrap();
         }
         let found = status(&job, &farm, &plan, None).unwrap();
         // 10 frames of 6 s by two tasks.
@@ -383,14 +390,14 @@ mod tests {
     fn what_failed_is_why_the_last_job_did_not_run() {
         let folder = tempfile::tempdir().unwrap();
         let (job, farm, plan) = shot(&folder, SCENE);
-        let write = |name: &str, event: Event| {
+        let write = |name: &str, event: JournalEvent| {
             let journal = journal::Journal::create(&farm.journal(), name).unwrap();
             journal.write(&start(&plan)).unwrap();
             journal.write(&event).unwrap();
         };
         write("task-2", end(143, "stopped"));
         write("task-1", end(1, "disk full"));
-        write("task-1", Event::Frame { number: 4, seconds: 1.0 });
+        write("task-1", JournalEvent::Frame { number: 4, seconds: 1.0 });
         let FinishStatus::Blocked { by } = status(&job, &farm, &plan, None).unwrap().finish else {
             panic!("a task failed")
         };

@@ -9,7 +9,7 @@ use bansho_base::{
     },
     phenomenon::Remark,
 };
-use bansho_media::format::OutputKind;
+use bansho_media::{files::naming::LiteralPart, format::OutputKind};
 use bansho_render::RenderError;
 use bansho_scene::LineColumn;
 
@@ -91,6 +91,14 @@ pub enum Warning {
         first: i64,
         /// Its last.
         last: i64,
+    },
+    /// A part of the name of the output looks like a frame number.
+    #[error("{path}: {part}", path = .path.display())]
+    LiteralName {
+        /// The output.
+        path: PathBuf,
+        /// The part.
+        part: LiteralPart,
     },
     /// 16 bits in a format that does not support them.
     #[error("the number of bits has no effect on .{}", .kind.extension())]

@@ -99,8 +99,9 @@ impl SceneFile {
         };
         match parse_scene(&self.name, &self.text) {
             _ if self.changes.is_empty() => Err(JobError::Scene(error)),
-            Err(own) => Err(JobError::Scene(Box::new(own))),
-            Ok(_) => Err(self.as_changed(*error)),
+            // If the file itself has the same problems, they are reported at its positions; otherwise at those of the changed text.
+            Err(own) if has_problems_of(&own, &error) => Err(JobError::Scene(Box::new(own))),
+            _ => Err(self.as_changed(*error)),
         }
     }
 
@@ -116,10 +117,10 @@ impl SceneFile {
         if self.changes.is_empty() {
             return Err(JobError::Scene(Box::new(errors.located(&self.name, &self.text))));
         }
-        // If the unchanged file has problems of its own, they are reported instead.
+        // If they are those of the unchanged file, they are reported there.
         let own = parse_scene(&self.name, &self.text).ok();
         match own.map(|own| CompiledScene::build(Arc::new(own), assets.clone(), None)) {
-            Some(Err(own)) => Err(JobError::Scene(Box::new(own.located(&self.name, &self.text)))),
+            Some(Err(own)) if own == errors => Err(JobError::Scene(Box::new(own.located(&self.name, &self.text)))),
             _ => Err(self.as_changed(errors.located(&self.name, &self.changed()?))),
         }
     }
@@ -147,12 +148,18 @@ impl SceneFile {
     }
 
     /// The text with the changes.
-    fn changed(&self) -> Result<String, JobError> {
+    pub(crate) fn changed(&self) -> Result<String, JobError> {
         self.changes.iter().try_fold(self.text.clone(), |text, assignment| {
             let fail = |source| JobError::Edit { assignment: assignment.clone(), source };
             edit::set(&text, assignment, KINDS).map_err(fail)
         })
     }
+}
+
+/// Whether the problems of an unchanged file are those of the changed one.
+fn has_problems_of(own: &SceneError, changed: &SceneError) -> bool {
+    let messages = |error: &SceneError| error.problems.iter().map(ToString::to_string).collect::<Vec<_>>();
+    messages(own) == messages(changed)
 }
 
 fn is_missing(error: &InputError) -> bool {

@@ -74,6 +74,10 @@ impl FrameSource for CountingSource {
         state(self.number)
     }
 
+    fn check_snapshot(&self, bytes: &[u8]) -> Result<(), SnapshotError> {
+        if bytes.len() == state(0).len() { Ok(()) } else { Err(SnapshotError::Damaged) }
+    }
+
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
         let bytes = snapshot.strip_prefix(&provenance::SNAPSHOT_MAGIC).and_then(|state| state.try_into().ok());
         let bytes = bytes.ok_or(SnapshotError::Damaged)?;

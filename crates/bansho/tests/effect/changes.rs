@@ -100,9 +100,11 @@ fn size_lights_and_time_change_without_a_new_effect() {
     };
     let moved = bansho::LightParameters { position: [-0.5, 2.5, -4.0].into(), ..lamp.clone() };
     let mut live = open(&lamp);
-    live.change_scene(|scene| scene.lights = vec![moved.clone()]).unwrap();
+    live.change_scene(|scene| scene.tables.set_all([moved.clone()])).unwrap();
     assert_eq!(live.at(0.5).unwrap().frame().beauty, open(&moved).at(0.5).unwrap().frame().beauty);
-    let wrong = live.change_scene(|scene| scene.lights[0].intensity = f64::NAN.into());
+    let wrong = live.change_scene(|scene| {
+        scene.tables.change_all(|light: &mut bansho::LightParameters| light.intensity = f64::NAN.into());
+    });
     assert!(wrong.unwrap_err().to_string().contains("light.0.intensity: NaN"));
 }
 

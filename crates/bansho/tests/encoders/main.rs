@@ -21,7 +21,7 @@ use bansho::{
     media::{
         files::naming::OutputPattern,
         format::PictureFormat,
-        output::sink::{FrameSlot, Picture, Sink, SinkOptions},
+        output::sink::{FinishedPicture, FrameSlot, Sink, SinkOptions},
     },
     render::display::BitDepth,
 };
@@ -55,13 +55,13 @@ impl Writing {
             let slot = FrameSlot { index, number: index as i64 };
             let mut frame = frame.clone();
             if sink.picture_format() == PictureFormat::Frame {
-                sink.write(slot, Picture::Linear(&frame)).unwrap();
+                sink.write(slot, FinishedPicture::Linear(&frame)).unwrap();
                 continue;
             }
             // Over black, premultiplied light is unchanged.
             frame.opaque |= sink.picture_format() == PictureFormat::OpaqueDisplay;
             let shown = light::shown(&frame, &self.view, self.bits, self.alpha);
-            sink.write(slot, Picture::Display(&shown, &[7; 32])).unwrap();
+            sink.write(slot, FinishedPicture::Display(&shown, &[7; 32])).unwrap();
             all.push(shown);
         }
         sink.finish().unwrap();

@@ -11,7 +11,7 @@ use bansho::{
         },
     },
     fire::particles::{BurnerParameters, BurnerShape, FlameParticles, FlameParticlesParameters},
-    media::assets::{gltf::decode_mesh, limits::MemoryLimit},
+    media::{gltf::decode_mesh, limits::MemoryLimit},
 };
 
 /// Middles of three right triangles on the ground, 10 m apart, and their legs: areas of 4.5, 0.5 and 0.125 m^2.

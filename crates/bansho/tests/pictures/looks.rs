@@ -8,7 +8,10 @@ use bansho::{
         frame::{DisplayPixels, Frame},
         host::assets::PictureLayers,
     },
-    media::assets::{FileAssets, decode_picture, limits::MemoryLimit},
+    media::{
+        assets::{FileAssets, decode_picture},
+        limits::MemoryLimit,
+    },
 };
 
 fn scenes() -> PathBuf {

@@ -13,10 +13,10 @@ use bansho_base::{
     parameters::{BuildError, Range},
     phenomenon::{
         Deflection, Phenomenon, PhenomenonInfo, Prepared, Run, SnapshotError, Stepped, Stepping,
-        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter as LightEmitter, Light, Publication, Surroundings},
     },
+    tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
 bansho_base::parameters! {
@@ -41,12 +41,19 @@ bansho_base::parameters! {
     }
 }
 
-impl Describe for EmitterParameters {
-    const KEY: &'static str = "emitter";
+impl EmitterParameters {
+    /// The table `[[emitter]]`.
+    pub(crate) const KIND: TableKind = TableKind::phenomenon::<Self>("emitter");
+}
+
+impl PhenomenonTable for EmitterParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
-        let dissolve = context.loop_s.unwrap_or(0.0);
-        let preroll_s = self.preroll_s + 0.5 * dissolve;
+        let crossfade_s = context.loop_s.unwrap_or(0.0);
+        let preroll_s = self.preroll_s + 0.5 * crossfade_s;
         Ok(Arc::new(Emitter {
             name: context.name.to_owned(),
             key: Key::new(context.seed, context.name),
@@ -54,7 +61,7 @@ impl Describe for EmitterParameters {
             velocity: DVec3::from(self.velocity),
             steps: 0,
             parameters: Self { preroll_s, ..self.clone() },
-            dissolve,
+            crossfade_s,
         }))
     }
 }
@@ -69,7 +76,7 @@ struct Emitter {
     name: String,
     key: Key,
     parameters: EmitterParameters,
-    dissolve: f64,
+    crossfade_s: f64,
     position: DVec3,
     velocity: DVec3,
     steps: u32,
@@ -84,7 +91,7 @@ impl Emitter {
 
 impl Phenomenon for Emitter {
     fn info(&self) -> PhenomenonInfo<'_> {
-        let stepping = Stepping { step: STEP, preroll: self.parameters.preroll_s, crossfade: self.dissolve };
+        let stepping = Stepping { step: STEP, preroll: self.parameters.preroll_s, crossfade: self.crossfade_s };
         PhenomenonInfo { stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
     }
 

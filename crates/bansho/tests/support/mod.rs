@@ -14,7 +14,7 @@ use bansho_base::{
         observer::Unobserved,
     },
     image::Image,
-    phenomenon::kind::{Describe, PhenomenonKind},
+    tables::{self, TableKind},
 };
 use bansho_render::{CompiledScene, PlanOptions, Shot};
 use bansho_scene::{Scene, SceneError, SceneOptions};
@@ -23,8 +23,14 @@ pub(crate) use absorber::AbsorberParameters;
 pub(crate) use emitter::EmitterParameters;
 pub(crate) use planned::Planned;
 
-pub(crate) fn kinds() -> [PhenomenonKind; 2] {
+/// The two phenomena.
+pub(crate) fn phenomena() -> [TableKind; 2] {
     [AbsorberParameters::KIND, EmitterParameters::KIND]
+}
+
+/// The tables that phenomena share, and the two phenomena.
+pub(crate) fn kinds() -> Vec<TableKind> {
+    tables::shared(bansho::KINDS).copied().chain(phenomena()).collect()
 }
 
 /// A camera at the origin that looks along -z: 45 pixels per meter at 1 m if the picture is 90 pixels high.
@@ -48,7 +54,7 @@ pub(crate) fn parse(text: &str) -> Result<Scene, SceneError> {
 pub(crate) fn compiled(
     file: &str,
     text: &str,
-    kinds: &[PhenomenonKind],
+    kinds: &[TableKind],
     assets: MemoryAssets,
 ) -> Result<CompiledScene, SceneError> {
     let scene = Arc::new(Scene::parse(file, text, kinds)?);

@@ -1,13 +1,18 @@
 //! Cameras: pose, lens, and projection between world and picture.
 
+pub mod angular_distance;
 pub mod directions;
+pub mod turns;
 pub mod upright_quad;
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::{
     math,
-    parameters::{Range, animated::Animated},
+    parameters::{
+        Range,
+        animated::{Animated, longest_cut_s},
+    },
 };
 
 crate::choice! {
@@ -34,6 +39,10 @@ crate::parameters! {
         position: Animated<[f64; 3]> = Animated::from([0.0, 1.2, 4.0]), unit("m");
         /// Point that the camera looks at.
         target: Animated<[f64; 3]> = Animated::from([0.0, 0.9, 0.0]), unit("m");
+        /// Direction that is at the top of the picture, as far as the line of sight allows. A camera that tilts through the zenith, or flies over its
+        /// target, would turn the picture by 180 degrees where it looks along this direction: choose or key one that the line of sight never meets, such
+        /// as [0, 0, 1] for a dome that tilts from the zenith to the north.
+        up: Animated<[f64; 3]> = Animated::from([0.0, 1.0, 0.0]);
         /// Rotation about the line of sight; positive tilts the camera to its left.
         roll_deg: Animated<f64> = Animated::from(0.0), limits(Range::new(-3600.0, 3600.0)), unit("degrees");
         /// Projection of the lens: perspective, dome or panorama.
@@ -83,18 +92,34 @@ impl CameraParameters {
         Some([longest, shortest].map(|focal| (2.0 * half_fov(self.sensor_height_mm, focal)).to_degrees()))
     }
 
+    /// The camera as an exposure with its middle at `middle` (s) sees it, in frames of `frame_s` seconds: on one side of every cut, which is no motion. See
+    /// [`Animated::of_exposure`].
+    #[must_use]
+    pub fn of_exposure(&self, middle: f64, frame_s: f64) -> Self {
+        let longest = longest_cut_s(frame_s);
+        Self {
+            position: self.position.of_exposure(middle, longest),
+            target: self.target.of_exposure(middle, longest),
+            up: self.up.of_exposure(middle, longest),
+            roll_deg: self.roll_deg.of_exposure(middle, longest),
+            vertical_fov_deg: self.vertical_fov_deg.of_exposure(middle, longest),
+            focal_length_mm: self.focal_length_mm.as_ref().map(|focal| focal.of_exposure(middle, longest)),
+            ..*self
+        }
+    }
+
     /// The camera at time `t` for a picture of `size` pixels.
     pub fn at(&self, t: f64, size: [usize; 2]) -> Camera {
         let half_fov = match &self.focal_length_mm {
             Some(focal) => half_fov(self.sensor_height_mm, focal.at(t)),
             None => 0.5 * self.vertical_fov_deg.at(t).to_radians(),
         };
-        let orientation =
-            look_at(DVec3::from(self.position.at(t)), DVec3::from(self.target.at(t)), self.roll_deg.at(t).to_radians());
+        let [position, target, up] = [&self.position, &self.target, &self.up].map(|vector| DVec3::from(vector.at(t)));
+        let orientation = look_at(position, target, up, self.roll_deg.at(t).to_radians());
         let height = size[1] as f64;
         Camera {
             lens: self.lens,
-            position: DVec3::from(self.position.at(t)),
+            position,
             world_from_camera: orientation,
             near: self.near,
             principal_point: DVec2::new(
@@ -118,11 +143,22 @@ fn half_fov(sensor_mm: f64, focal_mm: f64) -> f64 {
     math::atan(0.5 * sensor_mm / focal_mm)
 }
 
-/// Orientation of a camera, columns: right, up, backward. When the camera looks straight up, north (-z) is at the top, so that east is on the left, as
-/// on star charts. When it looks straight down, south is at the top.
-fn look_at(position: DVec3, target: DVec3, roll: f64) -> DMat3 {
+/// Cosine of the angle between the line of sight and `up` from which on the line of sight counts as parallel to it.
+const PARALLEL: f64 = 0.999_999;
+
+/// Orientation of a camera, columns: right, up, backward. With the default `up`, north (-z) is at the top when the camera looks straight up, so that
+/// east is on the left, as on star charts, and south when it looks straight down.
+fn look_at(position: DVec3, target: DVec3, up: DVec3, roll: f64) -> DMat3 {
     let back = (position - target).try_normalize().unwrap_or(DVec3::Z);
-    let reference = if back.y.abs() > 0.999_999 { DVec3::new(0.0, 0.0, back.y.signum()) } else { DVec3::Y };
+    let up = up.try_normalize().unwrap_or(DVec3::Y);
+    let along = back.dot(up);
+    let reference = if along.abs() <= PARALLEL {
+        up
+    } else {
+        // Nothing is up: south, or the vertical where the line of sight is about north and south.
+        let sign = along.signum();
+        if back.z.abs() < 0.9 { DVec3::new(0.0, 0.0, sign) } else { DVec3::new(0.0, sign, 0.0) }
+    };
     let right = reference.cross(back).normalize();
     let up = back.cross(right);
     let (sin, cos) = math::sin_cos(roll);
@@ -164,10 +200,11 @@ pub struct Projection {
 /// Camera metadata for file headers, for compositing programs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraHeader {
-    /// World to camera (row vectors, as OpenEXR's `worldToCamera`), meters.
-    pub world_to_camera: [[f32; 4]; 4],
+    /// World to camera (row vectors, as OpenEXR's `worldToCamera`), meters. In single precision its translation would be off by centimeters far from the
+    /// origin.
+    pub world_to_camera: [[f64; 4]; 4],
     /// World to the screen window from -1 to 1, as OpenEXR's `worldToNDC`; `None` for domes and panoramas, for which there is no such matrix.
-    pub world_to_ndc: Option<[[f32; 4]; 4]>,
+    pub world_to_ndc: Option<[[f64; 4]; 4]>,
     /// Vertical field of view of a perspective lens, degrees.
     pub vertical_fov_deg: Option<f32>,
     /// Projection of the lens; `None` for pictures that were not taken through a lens.
@@ -201,6 +238,12 @@ impl Camera {
         self
     }
 
+    /// The same camera, whose fisheye has no circle at which its picture ends.
+    pub fn with_unlimited_angle(mut self) -> Self {
+        self.half_angle = std::f64::consts::PI;
+        self
+    }
+
     /// `point` in camera space: right, up, backward, m.
     #[inline(always)]
     pub fn point_in_camera(&self, point: DVec3) -> DVec3 {
@@ -219,6 +262,17 @@ impl Camera {
     /// Projects `point` into the picture; `None` if it lies outside the field of view or nearer than `near`.
     #[inline(always)]
     pub fn project(&self, point: DVec3) -> Option<Projection> {
+        self.project_within(point, self.half_angle)
+    }
+
+    /// Like [`project`](Self::project), also outside the circle of a fisheye, for what only partly lies within it.
+    #[inline(always)]
+    pub fn project_beyond_circle(&self, point: DVec3) -> Option<Projection> {
+        self.project_within(point, std::f64::consts::PI)
+    }
+
+    #[inline(always)]
+    fn project_within(&self, point: DVec3, max_fisheye_angle: f64) -> Option<Projection> {
         let local = self.point_in_camera(point);
         let depth = self.depth(point);
         if depth.is_nan() || depth < self.near {
@@ -229,7 +283,7 @@ impl Camera {
             Lens::Fisheye => {
                 let across = math::hypot(local.x, local.y);
                 let angle = math::atan2(across, -local.z);
-                if angle > self.half_angle {
+                if angle > max_fisheye_angle {
                     return None;
                 }
                 if across > 0.0 { DVec2::new(local.x, local.y) * (angle / across) } else { DVec2::ZERO }
@@ -272,6 +326,94 @@ impl Camera {
         Some(self.world_from_camera * local)
     }
 
+    /// Solid angle of one pixel at a position in the picture, steradian: what turns an illuminance at the camera (lux) into the luminance of the pixels
+    /// that show it. With f the focal length in pixels it is cos^3 a / f^2 for a perspective lens at the angle a from its axis, sin t / t / f^2 for an
+    /// equidistant fisheye at the angle t, and cos of the latitude / f^2 for a panorama; 0 where the picture shows no direction.
+    #[must_use]
+    pub fn pixel_solid_angle(&self, pixel: DVec2) -> f64 {
+        let offset = (pixel - self.principal_point) / self.focal_pixels;
+        let relative = match self.lens {
+            Lens::Perspective => {
+                let cosine = 1.0 / (1.0 + offset.length_squared()).sqrt();
+                cosine * cosine * cosine
+            }
+            Lens::Fisheye => {
+                let angle = offset.length();
+                if angle > 0.0 { math::sin(angle) / angle } else { 1.0 }
+            }
+            Lens::Panorama => math::cos(offset.y),
+        };
+        relative.max(0.0) / (self.focal_pixels * self.focal_pixels)
+    }
+
+    /// Width in pixels after which a panorama repeats, 360 degrees; `None` for lenses whose pictures do not repeat.
+    #[must_use]
+    pub fn horizontal_period(&self) -> Option<f64> {
+        (self.lens == Lens::Panorama).then_some(std::f64::consts::TAU * self.focal_pixels)
+    }
+
+    /// The position nearest to `reference` at which the direction of `pixel` appears, so that both can be joined by a line: `pixel` moved by whole
+    /// periods of a panorama; for a fisheye possibly its image beyond the antipode, where the radius grows on past 180 degrees on the opposite side. It
+    /// may lie outside of the picture. Unchanged for a perspective lens.
+    #[must_use]
+    #[inline(always)]
+    pub fn nearest_repetition(&self, pixel: DVec2, reference: DVec2) -> DVec2 {
+        match self.lens {
+            Lens::Perspective => pixel,
+            Lens::Fisheye => {
+                let beyond = self.beyond_antipode(pixel);
+                let is_nearer = (beyond - reference).length_squared() < (pixel - reference).length_squared();
+                if is_nearer { beyond } else { pixel }
+            }
+            Lens::Panorama => {
+                let period = std::f64::consts::TAU * self.focal_pixels;
+                DVec2::new(pixel.x - period * ((pixel.x - reference.x) / period).round(), pixel.y)
+            }
+        }
+    }
+
+    /// Where a fisheye shows the direction of `pixel` if its radius grows on beyond the antipode, at 180 degrees: at 360 degrees less the angle, on the
+    /// opposite side.
+    fn beyond_antipode(&self, pixel: DVec2) -> DVec2 {
+        let offset = pixel - self.principal_point;
+        let radius = offset.length();
+        let direction = if radius > 0.0 { offset / radius } else { DVec2::X };
+        self.principal_point - direction * (std::f64::consts::TAU * self.focal_pixels - radius)
+    }
+
+    /// The line from `from` to the nearest repetition of `to` in all places where it may reach into the picture, with `margin` pixels around it: several
+    /// where it crosses the seam of a panorama, or the antipode of a fisheye. The second line of a fisheye is the first beyond the antipode, so that each
+    /// point is inside of 180 degrees in one of them.
+    #[must_use]
+    pub fn line_images(&self, from: DVec2, to: DVec2, margin: f64) -> Vec<[DVec2; 2]> {
+        let near_to = self.nearest_repetition(to, from);
+        match self.lens {
+            Lens::Perspective => vec![[from, to]],
+            Lens::Fisheye if near_to == to => vec![[from, to]],
+            Lens::Fisheye => vec![[from, near_to], [self.beyond_antipode(from), to]],
+            Lens::Panorama => {
+                let period = std::f64::consts::TAU * self.focal_pixels;
+                let (left, right) = (from.x.min(near_to.x) - margin, from.x.max(near_to.x) + margin);
+                let (first, last) = ((-right / period).ceil(), ((self.size[0] - left) / period).floor());
+                // Not where a coordinate is absurd or NaN.
+                let is_bounded = last - first < 1e6;
+                if !is_bounded {
+                    return Vec::new();
+                }
+                let shifts = (first as i64..=last as i64).map(|turn| DVec2::new(turn as f64 * period, 0.0));
+                shifts.map(|shift| [from + shift, near_to + shift]).collect()
+            }
+        }
+    }
+
+    /// Whether a position in the picture is within the circle of a fisheye; true for other lenses.
+    #[must_use]
+    #[inline(always)]
+    pub fn is_in_circle(&self, pixel: DVec2) -> bool {
+        let radius = self.half_angle * self.focal_pixels;
+        self.lens != Lens::Fisheye || (pixel - self.principal_point).length_squared() <= radius * radius
+    }
+
     /// Half of the field of view of a fisheye lens, radians.
     #[must_use]
     pub fn half_angle(&self) -> f64 {
@@ -290,11 +432,10 @@ impl Camera {
             world_to_camera[3][row] = translation[row];
         }
         world_to_camera[3][3] = 1.0;
-        let to_f32 = |matrix: [[f64; 4]; 4]| matrix.map(|row| row.map(|value| value as f32));
         let (is_perspective, is_fisheye) = (self.lens == Lens::Perspective, self.lens == Lens::Fisheye);
         CameraHeader {
-            world_to_camera: to_f32(world_to_camera),
-            world_to_ndc: is_perspective.then(|| to_f32(self.world_to_ndc(&world_to_camera))),
+            world_to_camera,
+            world_to_ndc: is_perspective.then(|| self.world_to_ndc(&world_to_camera)),
             vertical_fov_deg: is_perspective.then_some((2.0 * self.half_fov).to_degrees() as f32),
             lens: Some(self.lens),
             fisheye_fov_deg: is_fisheye.then_some((2.0 * self.half_angle).to_degrees() as f32),
@@ -366,6 +507,70 @@ mod tests {
     }
 
     #[test]
+    fn lines_join_neighboring_directions_across_the_seam_and_the_antipode() {
+        let straight_ahead = |lens, fov| CameraParameters {
+            lens,
+            fisheye_fov_deg: fov,
+            target: [0.0, 1.2, 3.0].into(),
+            ..Default::default()
+        };
+        for (lens, fov) in [(Lens::Fisheye, 360.0), (Lens::Fisheye, 340.0), (Lens::Panorama, 180.0)] {
+            let camera = straight_ahead(lens, fov).at(0.0, [400, 200]);
+            // On both sides of the direction backward, 2 degrees apart, and both elsewhere.
+            for (angle, count) in [(180.0_f64, 2), (90.0, 1)] {
+                let [from, to] = [-1.0, 1.0].map(|side: f64| {
+                    let (sin, cos) = math::sin_cos((angle + side).to_radians());
+                    camera
+                        .project_beyond_circle(camera.position + DVec3::new(5.0 * sin, 0.0, -5.0 * cos))
+                        .unwrap()
+                        .pixel
+                });
+                let lines = camera.line_images(from, to, 1.0);
+                assert_eq!(lines.len(), count, "{lens:?} {fov} at {angle}");
+                let length = 2.0_f64.to_radians() * camera.focal_pixels;
+                for [a, b] in &lines {
+                    assert!(((*a - *b).length() - length).abs() < 1e-6, "{lens:?} {fov} at {angle}: {a} {b}");
+                }
+                assert!(lines[0][0] == from || lines.iter().any(|line| line[0] == from));
+                assert!(lines.iter().any(|line| (line[1] - to).length() < 1e-9));
+            }
+        }
+    }
+
+    #[test]
+    fn the_solid_angles_of_all_pixels_sum_to_what_the_lens_sees() {
+        use std::f64::consts::PI;
+        let at = |lens, size| CameraParameters { lens, ..CameraParameters::default() }.at(0.0, size);
+        let seen = |camera: Camera| -> f64 {
+            let [width, height] = camera.size.map(|side| side as usize);
+            let centers = (0..height).flat_map(|y| (0..width).map(move |x| DVec2::new(x as f64 + 0.5, y as f64 + 0.5)));
+            centers
+                .filter(|pixel| camera.direction(*pixel).is_some())
+                .map(|pixel| camera.pixel_solid_angle(pixel))
+                .sum()
+        };
+        let panorama = seen(at(Lens::Panorama, [512, 256]));
+        assert!((panorama / (4.0 * PI) - 1.0).abs() < 1e-4, "{panorama}");
+        let dome = seen(at(Lens::Fisheye, [512, 512]));
+        assert!((dome / (2.0 * PI) - 1.0).abs() < 2e-3, "{dome}");
+        // A pyramid with the half angles a and b fills 4 asin(sin a sin b).
+        let perspective = seen(at(Lens::Perspective, [400, 400]));
+        let half = math::sin(16_f64.to_radians());
+        assert!((perspective / (4.0 * math::asin(half * half)) - 1.0).abs() < 1e-5, "{perspective}");
+    }
+
+    #[test]
+    fn a_panorama_repeats_and_other_lenses_do_not() {
+        let around = CameraParameters { lens: Lens::Panorama, ..CameraParameters::default() }.at(0.0, [1024, 512]);
+        let [left, right] = [DVec2::new(2.0, 300.0), DVec2::new(1020.0, 310.0)];
+        assert!((around.horizontal_period().unwrap() - 1024.0).abs() < 1e-9);
+        assert!((around.nearest_repetition(right, left) - DVec2::new(-4.0, 310.0)).length() < 1e-9);
+        assert!((around.nearest_repetition(left, right) - DVec2::new(1026.0, 300.0)).length() < 1e-9);
+        let straight = CameraParameters::default().at(0.0, [1024, 512]);
+        assert_eq!(straight.nearest_repetition(right, left), right);
+    }
+
+    #[test]
     fn larger_pixels_show_the_same_directions() {
         for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
             let fine = camera(lens);
@@ -417,13 +622,53 @@ mod tests {
     fn header_matrices_put_the_target_in_the_middle_of_the_screen_window() {
         let camera = CameraParameters { shift: [0.1, 0.2], ..CameraParameters::default() }.at(0.0, [400, 300]);
         let header = camera.header();
-        let point = [0.3_f32, 1.1, -0.5, 1.0];
-        let clip: Vec<f32> =
+        let point = [0.3, 1.1, -0.5, 1.0];
+        let clip: Vec<f64> =
             (0..4).map(|column| (0..4).map(|k| point[k] * header.world_to_ndc.unwrap()[k][column]).sum()).collect();
         let seen = camera.project(DVec3::new(0.3, 1.1, -0.5)).unwrap().pixel;
         let expected = DVec2::new(2.0 * seen.x / 400.0 - 1.0, 1.0 - 2.0 * seen.y / 300.0);
-        assert!((f64::from(clip[0] / clip[3]) - expected.x).abs() < 1e-5);
-        assert!((f64::from(clip[1] / clip[3]) - expected.y).abs() < 1e-5);
+        assert!((clip[0] / clip[3] - expected.x).abs() < 1e-12);
+        assert!((clip[1] / clip[3] - expected.y).abs() < 1e-12);
+    }
+
+    #[test]
+    fn header_matrices_hold_far_from_the_origin() {
+        let target = [500_000.0, 1.5, 400_000.0];
+        let parameters = CameraParameters {
+            position: [500_003.0, 1.6, 400_002.6].into(),
+            target: target.into(),
+            vertical_fov_deg: Animated::from(30.0),
+            ..CameraParameters::default()
+        };
+        let matrix = parameters.at(0.0, [1920, 1080]).header().world_to_ndc.unwrap();
+        let point = [target[0], target[1], target[2], 1.0];
+        let [x, y, w] = [0, 1, 3].map(|column| (0..4).map(|row| point[row] * matrix[row][column]).sum::<f64>());
+        let off = [960.0 * x / w, 540.0 * y / w];
+        assert!(off.iter().all(|pixels| pixels.abs() < 1e-4), "{off:?} pixels off");
+    }
+
+    #[test]
+    fn up_is_what_is_at_the_top() {
+        let toward = |up: [f64; 3], target: [f64; 3]| {
+            let parameters = CameraParameters {
+                position: [0.0; 3].into(),
+                target: target.into(),
+                up: up.into(),
+                ..CameraParameters::default()
+            };
+            parameters.at(0.0, [64, 64]).world_from_camera
+        };
+        for (up, target) in [([0.0, 0.0, 2.0], [0.0, 9.0, 0.0]), ([1.0, 0.0, 0.0], [0.0, 0.0, -4.0])] {
+            let axes = toward(up, target);
+            assert!((axes.y_axis - DVec3::from(up).normalize()).length() < 1e-12, "{up:?}: {axes:?}");
+            assert!((axes.determinant() - 1.0).abs() < 1e-12);
+        }
+        // Along the line of sight nothing is up.
+        for target in [[0.0, 3.0, 0.0], [0.0, 0.0, -3.0], [5.0, 0.0, 0.0]] {
+            let axes = toward(target, target);
+            assert!(axes.is_finite() && (axes.determinant() - 1.0).abs() < 1e-12, "{axes:?}");
+        }
+        assert_eq!(toward([0.0, 7.0, 0.0], [1.0, 2.0, 3.0]), toward([0.0, 1.0, 0.0], [1.0, 2.0, 3.0]));
     }
 
     #[test]

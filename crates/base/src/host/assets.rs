@@ -35,6 +35,18 @@ pub enum PictureAlpha {
     Associated,
 }
 
+impl PictureAlpha {
+    /// The values of a pixel multiplied by its alpha, between which pixels are interpolated.
+    #[inline(always)]
+    #[must_use]
+    pub fn premultiplied(self, [r, g, b, a]: [f32; 4]) -> [f32; 4] {
+        match self {
+            Self::Straight(_) => [r * a, g * a, b * a, a],
+            Self::Opaque | Self::Associated => [r, g, b, a],
+        }
+    }
+}
+
 /// A decoded picture, as a viewer shows it: turned as its file says, in known colors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
@@ -170,6 +182,14 @@ pub enum AssetProblem {
     /// There is no such file.
     #[error("no such file")]
     Missing,
+    /// There is no such file, and its name has the placeholder of another program for the frame number.
+    #[error("no such file; `{own}` stands for the frame number, not `{placeholder}`")]
+    OtherPlaceholder {
+        /// The placeholder in its name.
+        placeholder: String,
+        /// The placeholder to write instead.
+        own: String,
+    },
     /// The file name has more than one placeholder for the frame number, or one with too many digits.
     #[error(
         "must have exactly one placeholder for the frame number; allowed: one run of up to 20 `#` in the file name"
@@ -350,6 +370,15 @@ pub trait Assets: Send + Sync {
     /// The asset is missing or unreadable.
     fn find(&self, path: &str, frame: i64) -> Result<(), AssetError> {
         self.digest(path, frame).map(drop)
+    }
+
+    /// Checks without decoding it that the picture or the depth at `path` for frame `frame` is whole, as far as its structure tells; its width and height, or
+    /// `None` where only decoding tells them.
+    ///
+    /// # Errors
+    /// The asset is missing, unreadable or damaged.
+    fn check_whole(&self, path: &str, frame: i64) -> Result<Option<[usize; 2]>, AssetError> {
+        self.find(path, frame).map(|()| None)
     }
 
     /// A digest of the contents of `path` for frame `frame`: assets with equal digests are the same.

@@ -348,7 +348,7 @@ mod tests {
     #[test]
     fn neighbors_in_every_direction_are_uniform_and_uncorrelated() {
         let key = Key::new(42, "rain");
-        let at = |key: Key, birth: u64, step: u32, purpose: u32| key.uniforms(birth, step, Purpose(purpose))[0] as f64;
+        let at = |key: Key, id: u64, step: u32, purpose: u32| key.uniforms(id, step, Purpose(purpose))[0] as f64;
         type Neighbor<'a> = &'a dyn Fn(u64) -> (f64, f64);
         let neighbors: [Neighbor; 5] = [
             &|i| (at(key, i, 0, 0), at(key, i + 1, 0, 0)),
@@ -371,8 +371,8 @@ mod tests {
     fn bytes_of_the_words_are_equally_frequent() {
         let key = Key::new(7, "spark");
         let mut counts = [0_u32; 256];
-        for birth in 0..COUNT / 16 {
-            let words = key.words(birth, 0, POSITION);
+        for id in 0..COUNT / 16 {
+            let words = key.words(id, 0, POSITION);
             words.iter().flat_map(|word| word.to_le_bytes()).for_each(|byte| counts[byte as usize] += 1);
         }
         let mean = counts.iter().sum::<u32>() as f64 / 256.0;

@@ -50,6 +50,14 @@ pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
     fn simd_clamp01(self) -> Self {
         self.simd_max(self.broadcast(0.0)).simd_min(self.broadcast(1.0))
     }
+
+    /// The cubic `3 t^2 - 2 t^3` of `t` clamped to [0, 1]; NaN becomes 0.
+    #[must_use]
+    #[inline(always)]
+    fn simd_smoothstep(self) -> Self {
+        let t = self.simd_clamp01();
+        t * t * t.fma(t.broadcast(-2.0), t.broadcast(3.0))
+    }
 }
 
 impl Real for f32 {
@@ -104,6 +112,9 @@ fn refine_rsqrt<R: Real>(value: R, guess: R) -> R {
 
 /// A vector of [`LANES`] numbers.
 pub type Lanes<S> = f32x16<S>;
+
+/// Sixteen numbers in memory: what a loop over lanes reads and writes where the compiler makes vectors of it.
+pub type LaneArray = [f32; LANES];
 
 /// Half as many lanes, for loops with frequent early exits.
 pub type HalfLanes<S> = f32x8<S>;

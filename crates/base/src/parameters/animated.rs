@@ -42,6 +42,16 @@ impl<const N: usize> Animate for [f64; N] {
 pub const KEY_MEMORY_S: f64 = 30.0;
 /// Duration in which a value passes from one key to another that is meant to be at the same time, s.
 const FOLD_S: f64 = 1e-6;
+/// Time by which a step may come early, s: far below any exposure, and above the rounding of the middle of an exposure at any time of a shot. Without it
+/// the shutter that is open around a frame's time would show either side of a step at that time, as its middle is rounded.
+const STEP_TOLERANCE_S: f64 = 1e-9;
+
+/// The longest change that is no motion but a cut, s: a millisecond or a tenth of a frame of `frame_s` seconds, whichever is less. Keys this near to the
+/// beginning of a frame are meant to be there.
+#[must_use]
+pub fn longest_cut_s(frame_s: f64) -> f64 {
+    (0.1 * frame_s).min(1e-3)
+}
 
 /// A constant, or a value keyframed over time. Before the first and after the last key it is constant, unless it repeats. Times are in
 /// seconds.
@@ -86,10 +96,59 @@ impl<T: Animate> Animated<T> {
         closes
     }
 
-    /// Value at time `t`.
+    /// Value at time `t`. Steps come up to a nanosecond early, so that rounding of `t` never shows the value before one.
     pub fn at(&self, t: f64) -> T {
         let (_, t) = self.split_period(t);
-        self.map_components(|value| value, |curve| curve.eval(t))
+        let early = if self.interpolation() == Interpolation::Step { STEP_TOLERANCE_S } else { 0.0 };
+        self.map_components(|value| value, |curve| curve.eval(t + early))
+    }
+
+    /// By how much the value changes continuously between two times: a step is no motion.
+    pub fn displacement(&self, from: f64, to: f64) -> T {
+        let (before, after) = (self.at(from), self.at(to));
+        let is_moved = self.interpolation() != Interpolation::Step;
+        T::from_components(|index| if is_moved { after.component(index) - before.component(index) } else { 0.0 })
+    }
+
+    /// The value as an exposure with its middle at `middle` (s) sees it: on one side of every cut. Step keys hold the value that they have at the middle. Of
+    /// others, two keys with different values at most `longest_cut_s` apart, and much closer than their neighbors, are a cut too: that is how a
+    /// camera is keyed that moves before and after it. Beyond the cut, the last value before it holds, or the first one after it.
+    #[must_use]
+    pub fn of_exposure(&self, middle: f64, longest_cut_s: f64) -> Self {
+        match &self.motion {
+            Motion::Constant(_) => self.clone(),
+            Motion::Keyed(_) if self.interpolation() == Interpolation::Step => Self::from(self.at(middle)),
+            Motion::Keyed(curves) => match own_side(curves, middle, longest_cut_s) {
+                // In a loop the keys of a side would have to be joined across its end.
+                Some(side) if self.period.is_none() => {
+                    let keys = self.keys()[side].to_vec();
+                    Self::keyed(keys, self.interpolation()).unwrap_or_else(|_| self.clone())
+                }
+                _ => self.clone(),
+            },
+        }
+    }
+
+    /// Moves step keys that lie at most [`longest_cut_s`] from the beginning of a frame to it; frame `i` begins at i `seconds` / `frames`. Keys that would then
+    /// not be ascending stay where they are.
+    pub fn snap_steps(&mut self, [frames, seconds]: [u32; 2]) {
+        let keys = self.keys();
+        if keys.len() < 2 || self.interpolation() != Interpolation::Step {
+            return;
+        }
+        let [frames, seconds] = [frames, seconds].map(f64::from);
+        let longest = longest_cut_s(seconds / frames);
+        let mut snapped: Vec<(f64, T)> = Vec::with_capacity(keys.len());
+        for (index, (time, value)) in keys.iter().enumerate() {
+            let frame = (time * frames / seconds).round() * seconds / frames;
+            let is_after = snapped.last().is_none_or(|(before, _)| *before < frame);
+            let is_before = keys.get(index + 1).is_none_or(|(next, _)| frame < *next);
+            let is_near = (frame - time).abs() <= longest && is_after && is_before;
+            snapped.push((if is_near { frame } else { *time }, *value));
+        }
+        if let Ok(value) = Self::keyed(snapped, Interpolation::Step) {
+            self.motion = value.motion;
+        }
     }
 
     /// Time derivative at time `t`, per second; see [`Curve::derivative`].
@@ -215,6 +274,37 @@ impl<T: Animate> Animated<T> {
     }
 }
 
+/// The keys on the side of `middle` of all cuts, if there are cuts: see [`Animated::of_exposure`].
+fn own_side(curves: &[Curve], middle: f64, longest_cut_s: f64) -> Option<std::ops::Range<usize>> {
+    /// How many times longer than a cut the intervals before and after it are at least.
+    const ISOLATION: f64 = 10.0;
+    let times = curves.first()?.points();
+    let interval = |index: usize| match times.get(index..index + 2) {
+        Some(pair) => pair[1][0] - pair[0][0],
+        None => f64::INFINITY,
+    };
+    // Decimal times are rounded.
+    let longest = longest_cut_s * (1.0 + 1e-6) + STEP_TOLERANCE_S;
+    let is_cut = |index: &usize| {
+        let length = interval(*index);
+        let before = index.checked_sub(1).map_or(f64::INFINITY, interval);
+        length <= longest
+            && before.min(interval(index + 1)) >= ISOLATION * length
+            && curves.iter().any(|curve| curve.points()[*index][1] != curve.points()[index + 1][1])
+    };
+    let mut side = 0..times.len();
+    let cuts = (0..times.len().saturating_sub(1)).filter(is_cut);
+    for cut in cuts {
+        if middle + STEP_TOLERANCE_S >= times[cut + 1][0] {
+            side.start = cut + 1;
+        } else {
+            side.end = cut + 1;
+            break;
+        }
+    }
+    (side != (0..times.len())).then_some(side)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -266,6 +356,56 @@ mod tests {
             let frames: f64 = (0..90).map(|i| speed.integral(i as f64 * 0.1, (i + 1) as f64 * 0.1)).sum();
             assert!((speed.integral(0.0, end) - frames).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn steps_are_moved_to_the_frame_that_they_are_meant_for() {
+        let snapped = |time: f64, rate: [u32; 2]| {
+            let mut value = Animated::keyed(vec![(-5.0, 1.0), (time, 2.0)], Interpolation::Step).unwrap();
+            value.snap_steps(rate);
+            value.keys()[1].0
+        };
+        assert_eq!(snapped(0.6667, [30, 1]), 20.0 / 30.0);
+        assert_eq!(snapped(2.0021, [24_000, 1001]), 48.0 * 1001.0 / 24_000.0);
+        // A tenth of a frame is less than a millisecond from 100 frames per second on.
+        assert_eq!([snapped(1.0004, [240, 1]), snapped(1.0005, [240, 1])], [1.0, 1.0005]);
+        assert_eq!(
+            [snapped(1.0009, [30, 1]), snapped(1.0011, [30, 1]), snapped(-0.9995, [24, 1])],
+            [1.0, 1.0011, -1.0]
+        );
+        // Two keys cannot be at the same frame.
+        let keys = vec![(0.9995, 1.0), (1.0003, 2.0), (1.0005, 3.0)];
+        let mut value = Animated::keyed(keys, Interpolation::Step).unwrap();
+        value.snap_steps([30, 1]);
+        assert_eq!(value.keys(), [(1.0, 1.0), (1.0003, 2.0), (1.0005, 3.0)]);
+        let linear = Animated::keyed(vec![(0.0, 1.0), (0.6667, 2.0)], Interpolation::Linear).unwrap();
+        let mut kept = linear.clone();
+        kept.snap_steps([30, 1]);
+        assert_eq!(kept, linear);
+    }
+
+    #[test]
+    fn an_exposure_is_on_one_side_of_every_cut() {
+        let step = Animated::keyed(vec![(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)], Interpolation::Step).unwrap();
+        for (middle, value) in [(-1.0, 1.0), (0.99, 1.0), (1.0 - 1e-12, 2.0), (1.5, 2.0), (7.0, 3.0)] {
+            assert_eq!(step.of_exposure(middle, 1e-3), Animated::from(value), "{middle}");
+        }
+        assert_eq!((step.displacement(0.5, 1.5), step.at(1.0 - 1e-12)), (0.0, 2.0));
+        // It moves, cuts at 1 s, and moves on.
+        let keys = vec![(0.0, 0.0), (0.999, 1.0), (1.0, 10.0), (2.0, 20.0)];
+        for interpolation in [Interpolation::Linear, Interpolation::Monotone] {
+            let moving = Animated::keyed(keys.clone(), interpolation).unwrap();
+            let [before, after] = [0.99, 1.01].map(|middle| moving.of_exposure(middle, 1e-3));
+            assert_eq!([before.at(1.5), after.at(0.5)], [1.0, 10.0], "{interpolation:?}");
+            assert_eq!([before.at(0.999), after.at(1.0), after.at(2.0)], [1.0, 10.0, 20.0], "{interpolation:?}");
+            assert_eq!(moving.of_exposure(0.5, 0.9e-3), moving, "a change that takes longer is motion");
+        }
+        let linear = Animated::keyed(keys, Interpolation::Linear).unwrap();
+        assert_eq!(linear.of_exposure(0.5, 1e-3).at(0.7), linear.at(0.7));
+        // Keys a millisecond apart are a fast recording, not cuts.
+        let recorded = (0..50).map(|i| (1e-3 * f64::from(i), f64::from(i * i))).collect();
+        let recorded = Animated::keyed(recorded, Interpolation::Linear).unwrap();
+        assert_eq!(recorded.of_exposure(0.0205, 1e-3), recorded);
     }
 
     #[test]

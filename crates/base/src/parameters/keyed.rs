@@ -225,7 +225,12 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
             |(index, item): (usize, &Node)| reader.within(format!("keys.{index}"), |reader| read_key(item, reader));
         let keys: Vec<(f64, T)> = items.iter().enumerate().map(within).collect::<Option<_>>()?;
         match Self::keyed(keys, interpolation) {
-            Ok(animated) => Some(animated),
+            Ok(mut animated) => {
+                if let Some(frame_rate) = reader.frame_rate() {
+                    animated.snap_steps(frame_rate);
+                }
+                Some(animated)
+            }
             Err(error) => {
                 reader.report(node, CurveError::into(error));
                 None

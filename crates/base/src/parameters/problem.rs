@@ -129,21 +129,13 @@ pub enum ProblemKind {
     /// An error of a model in parameters that are each within their bounds.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The file has a newer format.
-    #[error("format {found} is newer than this program knows; known: up to {known}")]
-    NewerFormat {
+    /// The file has another format than this version reads.
+    #[error("format {found} cannot be read by this version; allowed: {allowed}")]
+    UnsupportedFormat {
         /// The file's format.
         found: i64,
-        /// The newest known one.
-        known: i64,
-    },
-    /// The file has an older format.
-    #[error("format {found} is old; `bansho upgrade` rewrites the file for format {known}")]
-    OlderFormat {
-        /// The file's format.
-        found: i64,
-        /// The newest known one.
-        known: i64,
+        /// The format that this version reads.
+        allowed: i64,
     },
     /// An asset that the scene refers to could not be loaded.
     #[error("{0}")]

@@ -24,12 +24,24 @@ pub struct Reader {
     omitted: usize,
     /// Location of the last problem that is still listed, once there are more problems than are kept.
     last_listed: Option<usize>,
+    /// Frames, and the seconds that they take, to which step keys are snapped.
+    frame_rate: Option<[u32; 2]>,
 }
 
 impl Reader {
     /// A reader at the root of a file.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// From now on step keys near the beginning of a frame are moved to it: see [`Animated::snap_steps`](super::animated::Animated::snap_steps).
+    pub fn set_frame_rate(&mut self, frames: u32, seconds: u32) {
+        self.frame_rate = Some([frames, seconds]);
+    }
+
+    /// Frames, and the seconds that they take, if they are known.
+    pub fn frame_rate(&self) -> Option<[u32; 2]> {
+        self.frame_rate
     }
 
     /// Runs `read` with `segment` appended to the path.

@@ -276,15 +276,9 @@ impl<const N: usize> Parameter for [i64; N] {
             reader.report(node, ProblemKind::ListLength { found: items.len(), min: N, max: N });
             return None;
         }
-        let whole = i64::kind(limits);
         let mut values = [0; N];
         for (value, item) in values.iter_mut().zip(items) {
-            let number = read_number(item, limits, unit, &whole, reader)?;
-            if number.fract() != 0.0 {
-                reader.wrong_type(item, &whole);
-                return None;
-            }
-            *value = number as i64;
+            *value = i64::read(item, limits, unit, reader)?;
         }
         Some(values)
     }

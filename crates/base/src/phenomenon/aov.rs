@@ -74,6 +74,18 @@ impl AovPlane {
         add(&mut self.weights, &other.weights);
     }
 
+    /// Adds the samples of another plane of the same size and AOV with a factor for their weights.
+    pub(super) fn add_weighted(&mut self, other: &Self, weight: f32, rule: AovRule) {
+        if rule == AovRule::Nearest {
+            return self.add_plane(other, rule);
+        }
+        let add = |sums: &mut [f32], more: &[f32]| {
+            sums.iter_mut().zip(more).for_each(|(sum, more)| *sum = weight.fma(*more, *sum));
+        };
+        add(&mut self.values, &other.values);
+        add(&mut self.weights, &other.weights);
+    }
+
     /// Blends with another plane of the same size and AOV: its own samples have the weight `own_weight`, the others the rest.
     pub(super) fn crossfade(&mut self, other: &Self, own_weight: f32, rule: AovRule) {
         if rule == AovRule::Nearest {

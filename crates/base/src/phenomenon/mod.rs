@@ -1,8 +1,6 @@
 //! The interface between phenomena (fire, rain, aurora, ...) and the renderer.
 
 pub(crate) mod aov;
-pub mod editor_hints;
-pub mod kind;
 pub mod strip;
 pub mod surroundings;
 
@@ -72,6 +70,15 @@ pub enum SnapshotError {
     /// Its length is wrong, or its checksum does not match.
     #[error("the snapshot is damaged")]
     Damaged,
+}
+
+/// Memory that several phenomena share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SharedMemory {
+    /// What it is: equal keys are the same memory.
+    pub key: (&'static str, u64),
+    /// Its size, bytes.
+    pub bytes: f64,
 }
 
 /// A note for the user about how a phenomenon will look; it does not stop rendering.
@@ -191,10 +198,15 @@ pub trait Phenomenon: Send + Sync {
     /// Luminance of its bright parts, cd/m^2, from which `exposure_ev100 = "auto"` is determined once per shot.
     fn luminance(&self) -> f64;
 
-    /// Memory of the phenomenon, a run of it and a prepared frame of `pixels` pixels, bytes, to a factor of one and a half: for the check before a job. Small
-    /// amounts are left out.
+    /// Memory of the phenomenon, a run of it and a prepared frame of `pixels` pixels, bytes, to a factor of one and a half: for the check before a job. What
+    /// [`shared_memory`](Self::shared_memory) tells is left out.
     fn memory_bytes(&self, _pixels: f64) -> f64 {
         0.0
+    }
+
+    /// What it holds in memory together with other phenomena when a frame of `view` is prepared; counted once for each key.
+    fn shared_memory(&self, _view: &View) -> Vec<SharedMemory> {
+        Vec::new()
     }
 
     /// A note for the user about how it will look among the other phenomena.
@@ -202,7 +214,12 @@ pub trait Phenomenon: Send + Sync {
         None
     }
 
-    /// Itself, for phenomena that give what they computed to their successor: see [`BuildContext::previous`](kind::BuildContext::previous).
+    /// A note for the user about how it will look in the picture of a view.
+    fn view_remark(&self, _view: &View) -> Option<Remark> {
+        None
+    }
+
+    /// Itself, for phenomena that give what they computed to their successor: see [`BuildContext::previous`](crate::tables::BuildContext::previous).
     fn as_any(&self) -> Option<&dyn Any> {
         None
     }
@@ -218,6 +235,12 @@ pub trait Run: Send + Sync {
 
     /// The depth intervals that it occupies, in any order. Slices are cut at their ends.
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval>;
+
+    /// Number of equal parts of the exposure that are prepared one by one and drawn as their mean, because what moves in the picture would be sharp
+    /// otherwise: `prepare` may show a part as it is in its middle. 1 if nothing moves by more than about a pixel, and for what `prepare` blurs itself.
+    fn exposure_parts(&self, _view: &View, _surroundings: &Surroundings) -> usize {
+        1
+    }
 
     /// Prepares one frame, so that strips of it can be drawn in any order by any thread.
     ///
@@ -257,6 +280,10 @@ impl<P: Run + ?Sized> Run for Arc<P> {
         (**self).depth_intervals(view, surroundings)
     }
 
+    fn exposure_parts(&self, view: &View, surroundings: &Surroundings) -> usize {
+        (**self).exposure_parts(view, surroundings)
+    }
+
     fn prepare<'a>(
         &'a self,
         view: &'a View,
@@ -284,6 +311,15 @@ pub trait Stepped: Send + Sync {
     /// computed by the run itself.
     fn time_for(&self, shutter: Shutter) -> f64 {
         shutter.middle()
+    }
+
+    /// Announces the exposure to whose time the run is stepped next, so that it keeps the earlier states from which it is drawn too.
+    fn begin_exposure(&mut self, _shutter: Shutter) {}
+
+    /// Whether all states from which an exposure is drawn are still to come, or are kept. Where not, the run starts again from its beginning: an
+    /// exposure is the same whichever was drawn before, and from whichever snapshot the run went on.
+    fn keeps_states_for(&self, _shutter: Shutter) -> bool {
+        true
     }
 
     /// Serializes the state.

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use fearless_simd::{Simd, f32x16, prelude::*};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::{
     camera::{Camera, CameraParameters},
+    geometry::point_cloud::local_origin,
     image::Rect,
     math::{self, MulAdd},
 };
@@ -38,6 +39,32 @@ impl Shutter {
     /// Midpoint of interval `index` of `count` equal intervals.
     pub fn instant(&self, index: usize, count: usize) -> f64 {
         self.open + self.duration() * (index as f64 + 0.5) / count as f64
+    }
+
+    /// Interval `index` of `count` equal intervals.
+    #[must_use]
+    pub fn part(&self, index: usize, count: usize) -> Self {
+        let end = |index: usize| self.open + self.duration() * index as f64 / count as f64;
+        Self { open: end(index), close: if index + 1 == count { self.close } else { end(index + 1) } }
+    }
+
+    /// Number of equal parts of the exposure, a power of two, in each of which a flame hardly flickers, and its light of a radius (m) hardly moves that moves
+    /// along a path of a length (m).
+    #[must_use]
+    pub fn light_parts(&self, path: f64, radius: f64) -> usize {
+        /// Motion that makes no difference to what is lit, m; and most time samples.
+        const MIN_STEP: f64 = 0.05;
+        const MAX_SAMPLES: usize = 16;
+        /// Flames hardly flicker in a shorter time, s.
+        const MIN_DURATION: f64 = 1.0 / 24.0;
+        let by_path = parts_of_motion(path, MIN_STEP.max(0.5 * radius), MAX_SAMPLES);
+        by_path.max(parts_of_motion(self.duration() * (1.0 - 1e-9), MIN_DURATION, MAX_SAMPLES)).next_power_of_two()
+    }
+
+    /// Five times from its opening to its closing, evenly spaced: enough to measure the path of what moves.
+    #[must_use]
+    pub fn path_times(&self) -> [f64; 5] {
+        std::array::from_fn(|index| self.open + self.duration() * 0.25 * index as f64)
     }
 }
 
@@ -74,7 +101,7 @@ const MAX_INSTANTS: f64 = 16.0;
 pub struct View {
     /// Camera at the middle of the exposure.
     pub camera: Camera,
-    /// Parameters of the camera over time.
+    /// Parameters of the camera over time, on the exposure's side of every cut: no motion, be it in the open shutter or to the next frame, crosses one.
     pub camera_parameters: CameraParameters,
     /// When the shutter is open.
     pub shutter: Shutter,
@@ -96,6 +123,8 @@ pub struct View {
     pub white_luminance: Option<f64>,
     /// Whether AOVs are requested; strips then have planes for them.
     pub aovs_requested: bool,
+    /// Where the positions of exported particles count from, m: the same for all frames of a shot.
+    pub export_origin: [f64; 3],
     /// In a loop: the same view one loop period earlier or later, whichever is nearer, for the crossfade between runs.
     pub adjacent_loop_view: Option<Arc<Self>>,
 }
@@ -109,7 +138,10 @@ impl View {
         size: [usize; 2],
         overscan: usize,
     ) -> Self {
-        let camera = camera_parameters.at(shutter.middle(), size).with_overscan(overscan);
+        let middle = shutter.middle();
+        let export_origin = local_origin(camera_parameters.position.at(0.0));
+        let camera_parameters = camera_parameters.of_exposure(middle, next_middle - middle);
+        let camera = camera_parameters.at(middle, size).with_overscan(overscan);
         let size = size.map(|side| side + 2 * overscan);
         Self {
             camera,
@@ -124,6 +156,7 @@ impl View {
             mirror: None,
             white_luminance: None,
             aovs_requested: false,
+            export_origin,
             adjacent_loop_view: None,
         }
     }
@@ -170,6 +203,23 @@ impl View {
         coarse.with_window(Rect::from_size(size[0], size[1]))
     }
 
+    /// The view during part `index` of `count` equal parts of the exposure, with a camera on the same side of every cut.
+    #[must_use]
+    pub fn part(&self, index: usize, count: usize) -> Self {
+        self.clone().with_adjacent_loop_view(|view| {
+            let shutter = view.shutter.part(index, count);
+            view.next_middle += shutter.middle() - view.shutter.middle();
+            view.camera = view.camera_at(shutter.middle());
+            view.shutter = shutter;
+        })
+    }
+
+    /// The camera at [`Shutter::path_times`], to measure the motion of points in the picture.
+    #[must_use]
+    pub fn path_cameras(&self) -> PathCameras {
+        PathCameras(self.shutter.path_times().map(|t| (t, self.camera_at(t))))
+    }
+
     /// Largest motion of the sky in the picture during the exposure, pixels.
     pub fn motion_pixels(&self) -> f64 {
         // Sampled at the corners, the middle, and near the middles of the edges, since the corners of a dome lie outside its circle.
@@ -184,13 +234,25 @@ impl View {
             [0.98, 0.5],
             [0.5, 0.98],
         ];
-        let [open, close] = [self.shutter.open, self.shutter.close].map(|t| self.camera_at(t));
-        let motion = |[x, y]: [f64; 2]| {
+        /// How much longer the path of the sky is than from its first to its last position where it is not nearly straight.
+        const DETOUR: f64 = 1.05;
+        let cameras = self.path_cameras();
+        if cameras.is_still() {
+            return 0.0;
+        }
+        let [(_, open), .., (_, close)] = cameras.0;
+        let motion = |before: &Camera, after: &Camera, [x, y]: [f64; 2]| {
             let direction_at = |camera: &Camera| camera.direction(DVec2::new(x * camera.size[0], y * camera.size[1]));
-            let pair = direction_at(&open).zip(direction_at(&close));
+            let pair = direction_at(before).zip(direction_at(after));
             pair.map_or(0.0, |(a, b)| math::acos(a.normalize().dot(b.normalize()).clamp(-1.0, 1.0)) * open.focal_pixels)
         };
-        SAMPLE_POSITIONS.map(motion).into_iter().fold(0.0, f64::max)
+        let largest = |position: [f64; 2]| {
+            let displacement = motion(&open, &close, position);
+            // A camera that shakes may end where it began.
+            let path: f64 = cameras.0.windows(2).map(|pair| motion(&pair[0].1, &pair[1].1, position)).sum();
+            if path > DETOUR * displacement + 0.1 { path } else { displacement }
+        };
+        SAMPLE_POSITIONS.map(largest).into_iter().fold(0.0, f64::max)
     }
 
     /// Cameras at the time samples of the exposure, with equal weights. Their number follows from the motion of distant objects in the picture; it is
@@ -215,6 +277,39 @@ impl View {
         let camera = if self.pixel_size > 1 { camera.with_pixel_size(self.pixel_size) } else { camera };
         self.mirror.map_or(camera, |height| camera.mirrored(height))
     }
+}
+
+/// Cameras from the opening to the closing of the shutter.
+#[derive(Clone, Copy, Debug)]
+pub struct PathCameras([(f64, Camera); 5]);
+
+impl PathCameras {
+    /// Whether the camera stands still.
+    #[must_use]
+    pub fn is_still(&self) -> bool {
+        self.0.iter().all(|(_, camera)| *camera == self.0[0].1)
+    }
+
+    /// Length of the path of a point, given at any time, in the picture, pixels. For points beside or behind the camera it is measured as in the middle of the
+    /// picture.
+    pub fn path_pixels(&self, point: impl Fn(f64) -> DVec3) -> f64 {
+        let positions = self.0.map(|(t, camera)| {
+            let direction = camera.point_in_camera(point(t)).try_normalize().unwrap_or_default();
+            (direction, camera.focal_pixels)
+        });
+        let motion = |pair: &[(DVec3, f64)]| {
+            let [(from, from_focal), (to, to_focal)] = [pair[0], pair[1]];
+            // A zoom moves what is beside the optical axis.
+            (to - from).length() * to_focal + (to_focal - from_focal).abs() * math::hypot(to.x, to.y)
+        };
+        positions.windows(2).map(motion).sum()
+    }
+}
+
+/// Number of equal parts of an exposure so that what moves by `pixels` moves by at most `pixels_per_part` in each, at most `max_count`.
+#[must_use]
+pub fn parts_of_motion(pixels: f64, pixels_per_part: f64, max_count: usize) -> usize {
+    (pixels / pixels_per_part).ceil().clamp(1.0, max_count as f64) as usize
 }
 
 /// A region of the picture that one thread draws: radiance L and transmittance T of one depth slice.
@@ -397,6 +492,45 @@ impl Strip {
         self.depth.iter_mut().zip(&other.depth).for_each(|(own, other)| *own = own.min(*other));
         for ((own, other), aov) in self.aovs.iter_mut().zip(&other.aovs).zip(aovs) {
             own.crossfade(other, own_weight, aov.rule);
+        }
+    }
+
+    /// Resets it to an empty strip over the pixels `rect` of another one, with the same plate and AOVs.
+    pub fn reset_within(&mut self, rect: Rect, other: &Self) {
+        self.reset(rect, None, other.aovs.len());
+        if other.has_plate() {
+            for y in rect.y..rect.bottom() {
+                let first = (y - other.rect.y) * other.rect.width + rect.x - other.rect.x;
+                self.plate_depth.extend_from_slice(&other.plate_depth[first..][..rect.width]);
+            }
+        }
+    }
+
+    /// Adds a strip over some of the same pixels that shows a fraction `weight` of the exposure, to a strip that contains other parts of it and nothing else:
+    /// light, and what is absorbed, are averaged. With AOVs, both must have the same pixels.
+    pub fn add_exposure_part(&mut self, part: &Self, weight: f32, aovs: &[AovDescriptor]) {
+        self.upgrade_absorption(part.absorption);
+        for row in 0..part.rect.height {
+            let from = row * part.rect.width;
+            let to = (part.rect.y - self.rect.y + row) * self.rect.width + part.rect.x - self.rect.x;
+            let (from, to) = (from..from + part.rect.width, to..to + part.rect.width);
+            for (sum, light) in self.radiance.iter_mut().zip(&part.radiance) {
+                sum[to.clone()].iter_mut().zip(&light[from.clone()]).for_each(|(sum, l)| *sum = weight.fma(*l, *sum));
+            }
+            for c in 0..self.absorption.planes() {
+                let own = match part.absorption {
+                    Absorption::None => break,
+                    Absorption::Gray => &part.transmittance[0],
+                    Absorption::Colored => &part.transmittance[c],
+                };
+                let sum = &mut self.transmittance[c][to.clone()];
+                sum.iter_mut().zip(&own[from.clone()]).for_each(|(sum, t)| *sum = weight.fma(*t - 1.0, *sum));
+            }
+            let nearest = &mut self.depth[to];
+            nearest.iter_mut().zip(&part.depth[from]).for_each(|(nearest, depth)| *nearest = nearest.min(*depth));
+        }
+        for ((own, part), aov) in self.aovs.iter_mut().zip(&part.aovs).zip(aovs) {
+            own.add_weighted(part, weight, aov.rule);
         }
     }
 

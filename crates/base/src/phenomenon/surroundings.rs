@@ -89,6 +89,12 @@ impl Light {
         (total > 0.0).then_some(Self { emitter: Emitter::Point { position, radius }, intensity })
     }
 
+    /// The light with `factor` times its intensity.
+    #[must_use]
+    pub fn scaled(self, factor: f32) -> Self {
+        if factor == 1.0 { self } else { Self { intensity: self.intensity.map(|value| value * factor), ..self } }
+    }
+
     /// Luminous intensity, candela; `None` for a directional light, whose illuminance is [`luminance`](color::luminance) of its intensity, in lux.
     #[must_use]
     pub fn luminous_intensity(&self) -> Option<f32> {
@@ -176,6 +182,11 @@ pub struct Publication {
     pub occluders: Vec<Occluder>,
     /// Those of the solids that are seen, and so cast shadows.
     pub shadow_casters: Vec<Occluder>,
+    /// Length of the longest path of a point of them during the exposure, m.
+    pub shadow_motion: f64,
+    /// Number of equal parts of the exposure, a power of two, in each of which the lights hardly move or change; 0 or 1 if they stand still. `lights` are those
+    /// in its middle.
+    pub light_parts: usize,
 }
 
 impl Publication {
@@ -185,6 +196,8 @@ impl Publication {
         self.extinction += other.extinction;
         self.occluders.extend_from_slice(&other.occluders);
         self.shadow_casters.extend_from_slice(&other.shadow_casters);
+        self.shadow_motion = self.shadow_motion.max(other.shadow_motion);
+        self.light_parts = self.light_parts.max(other.light_parts);
     }
 }
 
@@ -194,10 +207,8 @@ impl Publication {
 pub struct OtherPhenomena<'a> {
     /// Lights and obstacles of the scene itself.
     pub scene: &'a Publication,
-    /// Number of phenomena.
-    pub count: usize,
-    /// Returns the publication of the phenomenon with an index; called only when needed.
-    pub published: &'a dyn Fn(usize) -> &'a Publication,
+    /// Returns what all phenomena publish; called only when needed.
+    pub published: &'a dyn Fn() -> &'a PublishedByAll,
     /// Index of the phenomenon itself.
     pub own_index: usize,
     /// The light of the sky.
@@ -207,18 +218,44 @@ pub struct OtherPhenomena<'a> {
 impl<'a> OtherPhenomena<'a> {
     /// All lights but its own.
     pub fn lights(&self) -> impl Iterator<Item = &'a Light> + use<'a> {
-        self.others().flat_map(|publication| &publication.lights)
+        let (own, published) = (self.own_index, self.published);
+        let others = std::iter::once_with(published).flat_map(move |all| all.but(own, &all.with_lights));
+        self.scene.lights.iter().chain(others.flat_map(|publication| &publication.lights))
     }
 
     /// All solids but its own.
     pub fn occluders(&self) -> impl Iterator<Item = &'a Occluder> + use<'a> {
-        self.others().flat_map(|publication| &publication.occluders)
+        let (own, published) = (self.own_index, self.published);
+        let others = std::iter::once_with(published).flat_map(move |all| all.but(own, &all.with_occluders));
+        self.scene.occluders.iter().chain(others.flat_map(|publication| &publication.occluders))
+    }
+}
+
+/// What all phenomena of a scene publish.
+///
+/// Each of many phenomena may ask for the lights or solids of the others. Those that publish any are listed, so that what publishes none costs nothing.
+#[derive(Clone, Debug, Default)]
+pub struct PublishedByAll {
+    publications: Vec<Publication>,
+    with_lights: Vec<usize>,
+    with_occluders: Vec<usize>,
+}
+
+impl PublishedByAll {
+    /// The publications of all phenomena, in their order.
+    #[must_use]
+    pub fn new(publications: Vec<Publication>) -> Self {
+        let indices = |is_listed: fn(&Publication) -> bool| -> Vec<usize> {
+            (0..publications.len()).filter(|&index| is_listed(&publications[index])).collect()
+        };
+        let with_lights = indices(|publication| !publication.lights.is_empty());
+        let with_occluders = indices(|publication| !publication.occluders.is_empty());
+        Self { publications, with_lights, with_occluders }
     }
 
-    fn others(&self) -> impl Iterator<Item = &'a Publication> + use<'a> {
-        let (own, published) = (self.own_index, self.published);
-        let others = (0..self.count).filter(move |index| *index != own);
-        std::iter::once(self.scene).chain(others.map(published))
+    /// Those of `listed` except that of phenomenon `own`.
+    fn but<'a>(&'a self, own: usize, listed: &'a [usize]) -> impl Iterator<Item = &'a Publication> + use<'a> {
+        listed.iter().filter(move |&&index| index != own).map(|&index| &self.publications[index])
     }
 }
 
@@ -264,8 +301,42 @@ pub struct Surroundings<'a> {
     pub reflection: Option<&'a Reflection>,
     /// With a plate: the background of all phenomena in that mirror, plate and sky.
     pub backdrop: Option<&'a Backdrop>,
-    /// Lights, extinction and occluders of the other phenomena and of the scene itself.
+    /// Lights, extinction and occluders of the other phenomena and of the scene itself. Where the camera stands still, lights that move are several along
+    /// their paths, each with its share of the light; else they are where they are in the middle of the exposure.
     pub others: Publication,
+    /// Lights in equal parts of the exposure; none if they stand still. For what is drawn at several times, as the camera or the thing moves.
+    pub light_parts: Vec<Vec<Light>>,
+}
+
+impl Surroundings<'_> {
+    /// The lights at a fraction of the exposure, 0 to 1.
+    #[must_use]
+    pub fn lights_at(&self, fraction: f64) -> &[Light] {
+        let index = (fraction * self.light_parts.len() as f64) as usize;
+        match self.light_parts.get(index).or(self.light_parts.last()) {
+            Some(lights) => lights,
+            None => &self.others.lights,
+        }
+    }
+}
+
+/// One set of lights for all parts of an exposure: of lights that move, each has its share of the light; those that stand still remain one.
+#[must_use]
+pub fn lights_of_parts(parts: &[Vec<Light>]) -> Vec<Light> {
+    let share = 1.0 / parts.len().max(1) as f32;
+    let mut mean: Vec<Light> = Vec::new();
+    let longest = parts.iter().map(Vec::len).max().unwrap_or(0);
+    for index in 0..longest {
+        let first = mean.len();
+        for light in parts.iter().filter_map(|lights| lights.get(index)) {
+            let light = light.scaled(share);
+            match mean[first..].iter_mut().find(|earlier| earlier.emitter == light.emitter) {
+                Some(earlier) => (0..3).for_each(|c| earlier.intensity[c] += light.intensity[c]),
+                None => mean.push(light),
+            }
+        }
+    }
+    mean
 }
 
 /// Air with default temperature and pressure.
@@ -281,6 +352,7 @@ impl<'a> Surroundings<'a> {
             reflection: None,
             backdrop: None,
             others: Publication::default(),
+            light_parts: Vec::new(),
         }
     }
 }
@@ -295,6 +367,23 @@ mod tests {
             Light { emitter: Emitter::Point { position: DVec3::ZERO, radius: 0.5 }, intensity: [8.0, 4.0, 2.0] };
         assert_eq!(light.illuminance(DVec3::new(2.0, 0.0, 0.0)).0, [2.0, 1.0, 0.5]);
         assert_eq!(light.illuminance(DVec3::new(0.1, 0.0, 0.0)).0, light.illuminance(DVec3::new(0.5, 0.0, 0.0)).0);
+    }
+
+    #[test]
+    fn lights_of_all_parts_have_their_shares() {
+        let at = |x: f64, intensity: f32| Light {
+            emitter: Emitter::Point { position: DVec3::new(x, 0.0, 0.0), radius: 0.1 },
+            intensity: [intensity; 3],
+        };
+        // The first flashes, the second moves.
+        let parts = [vec![at(0.0, 8.0), at(1.0, 4.0)], vec![at(0.0, 0.0), at(2.0, 4.0)]];
+        assert_eq!(lights_of_parts(&parts), [at(0.0, 4.0), at(1.0, 2.0), at(2.0, 2.0)]);
+        let wind = Wind::new(crate::world::wind::WindParameters::default(), 1, None);
+        let surroundings = Surroundings { light_parts: parts.to_vec(), ..Surroundings::from_wind(&wind) };
+        assert_eq!(
+            [0.0, 0.4, 0.6, 1.0].map(|t| surroundings.lights_at(t)[1]),
+            [1.0, 1.0, 2.0, 2.0].map(|x| at(x, 4.0))
+        );
     }
 
     #[test]
@@ -340,10 +429,10 @@ mod tests {
             let emitter = Emitter::Directional { toward: DVec3::Y };
             Publication { lights: vec![Light { emitter, intensity: [intensity; 3] }], ..Publication::default() }
         };
-        let (scene, published) = (shining(1.0), [shining(2.0), shining(3.0), shining(4.0)]);
-        let published = |index: usize| &published[index];
-        let neighbors =
-            OtherPhenomena { scene: &scene, count: 3, published: &published, own_index: 1, sky: &Sky::DARK };
+        let dark = Publication::default();
+        let (scene, all) = (shining(1.0), PublishedByAll::new(vec![shining(2.0), shining(3.0), dark, shining(4.0)]));
+        let published = || &all;
+        let neighbors = OtherPhenomena { scene: &scene, published: &published, own_index: 1, sky: &Sky::DARK };
         let intensities: Vec<f32> = neighbors.lights().map(|light| light.intensity[0]).collect();
         assert_eq!((intensities, neighbors.occluders().count()), (vec![1.0, 2.0, 4.0], 0));
     }

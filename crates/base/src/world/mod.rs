@@ -1,8 +1,7 @@
-//! The environment shared by all phenomena of a scene: air, gravity, wind, sky and obstacles.
+//! The environment shared by all phenomena of a scene: air, gravity, wind, sky and solids.
 
 pub mod air;
 pub mod gravity;
-pub mod obstacle;
 pub mod occluder;
 pub mod sky;
 pub mod wind;

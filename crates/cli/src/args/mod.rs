@@ -55,8 +55,6 @@ pub(crate) enum Command {
     New(NewArgs),
     /// Check scene files and print every error with its position.
     Check(CheckArgs),
-    /// Rewrite a scene file of an older format in the current one; comments are kept.
-    Upgrade(UpgradeArgs),
     /// Print the JSON schema of scene files, for completion and checks in text editors.
     Schema,
     /// Draw a scene to pictures, a video, or a contact sheet.
@@ -116,13 +114,6 @@ pub(crate) struct CheckArgs {
     pub(crate) scenes: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) inputs: InputArgs,
-}
-
-/// `bansho upgrade`
-#[derive(Args, Debug)]
-pub(crate) struct UpgradeArgs {
-    /// The scene file.
-    pub(crate) scene: PathBuf,
 }
 
 /// `bansho studio`

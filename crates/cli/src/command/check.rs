@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bansho::{
-    base::host::printable::printable,
+    base::host::printable::{printable, printable_excerpt},
     job::{self, JobError},
 };
 
@@ -45,6 +45,7 @@ fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
     let drawn = plan.scene().instances.iter().filter(|instance| instance.enabled);
     let names: Vec<&str> = drawn.map(|instance| instance.name.as_str()).collect();
     let names = if names.is_empty() { "no phenomena".to_owned() } else { names.join(", ") };
+    let names = printable_excerpt(&names);
     Ok(format!(
         "{}: valid. {width} x {height}, {numbers} at {rate} fps, EV100 {:.1}: {names}\n",
         printable(&scene.name),

@@ -1,9 +1,12 @@
 //! Commands that print what is generated from the descriptions of scenes and options: `bansho schema`, `completions` and `man`.
 
-use std::fs;
+use std::path::Path;
 
-use anyhow::Context;
-use bansho::{KINDS, scene::schema::schema};
+use bansho::{
+    KINDS,
+    media::files::{atomic, overwrite_policy::OverwritePolicy, provenance::MANUAL_LINE},
+    scene::schema::schema,
+};
 use clap::CommandFactory;
 
 use crate::{
@@ -30,6 +33,18 @@ pub(crate) fn run_man(args: &ManArgs) -> anyhow::Result<()> {
         clap_mangen::Man::new(Cli::command()).render(&mut page)?;
         return Ok(print(&String::from_utf8_lossy(&page))?);
     };
-    let written = fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
-    written.with_context(|| format!("{}: the manual pages cannot be written", folder.display()))
+    let mut command = Cli::command().disable_help_subcommand(true);
+    command.build();
+    write_pages(command, folder)
+}
+
+/// Writes the manual pages of a command and of all commands in it.
+fn write_pages(command: clap::Command, folder: &Path) -> anyhow::Result<()> {
+    for inner in command.get_subcommands().filter(|inner| !inner.is_hide_set()).cloned() {
+        write_pages(inner, folder)?;
+    }
+    let page = clap_mangen::Man::new(command);
+    let mut text = MANUAL_LINE.as_bytes().to_vec();
+    page.render(&mut text)?;
+    Ok(atomic::write_bytes(&folder.join(page.get_filename()), &text, &OverwritePolicy::default())?)
 }

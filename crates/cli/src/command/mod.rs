@@ -11,8 +11,8 @@ pub(crate) mod render;
 pub(crate) mod simulate;
 pub(crate) mod streaks;
 pub(crate) mod studio;
-pub(crate) mod upgrade;
 
+use anyhow::Context;
 use bansho::{base::math::simd::set_vector_level, job::JobError};
 
 use crate::{
@@ -20,6 +20,16 @@ use crate::{
     interrupt,
     progress::{JobResult, ProgressReporter},
 };
+
+/// A pool of so many threads; of one for each core if there is no number.
+fn thread_pool(threads: Option<u16>) -> anyhow::Result<rayon::ThreadPool> {
+    let count = threads.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
+    pool.with_context(|| match threads {
+        Some(count) => format!("--threads {count}: the system starts no more threads; allowed: fewer"),
+        None => "the system starts no thread for each core; --threads states how many".to_owned(),
+    })
+}
 
 /// Runs a job in a thread pool of its own, and reports its progress and its result.
 fn run_job(
@@ -29,8 +39,7 @@ fn run_job(
     set_vector_level(args.vector_level)?;
     let reporter = ProgressReporter::new(args.progress, args.stats);
     interrupt::set_grace_period(reporter.forced_exit_message());
-    // 0 is one thread for each core.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.map_or(0, usize::from)).build()?;
+    let pool = thread_pool(args.threads)?;
     let result = pool.install(|| job(&reporter));
     reporter.finish(result, pool.current_num_threads())
 }

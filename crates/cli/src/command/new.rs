@@ -4,14 +4,19 @@ use std::path::{Path, PathBuf};
 
 use bansho::{
     KINDS,
-    base::{host::printable::printable, parameters::nearest, phenomenon::kind::PhenomenonKind},
+    base::{host::printable::printable, parameters::nearest, tables::TableKind},
     media::{MediaError, files::atomic},
+    phenomena,
     scene::template,
 };
 
 use bansho_example_scenes::{ExampleScene, SCENES};
 
-use crate::{args::NewArgs, exit::UsageError, output::print};
+use crate::{
+    args::NewArgs,
+    exit::UsageError,
+    output::{print, shell_word},
+};
 
 /// The error for an unknown `name` of an example or a phenomenon.
 fn unknown(kind: &str, name: &str, known: &[&str]) -> UsageError {
@@ -30,19 +35,20 @@ pub(crate) fn run(args: &NewArgs) -> anyhow::Result<()> {
             copy_assets(example, path.parent().unwrap_or(Path::new("")))?;
         }
     }
-    Ok(print(&format!("{0}: written. Draw it: bansho render {0}\n", printable(&path.display().to_string())))?)
+    let shown = path.display().to_string();
+    Ok(print(&format!("{}: written. Draw it: bansho render {}\n", printable(&shown), shell_word(&path)))?)
 }
 
 /// The text of a new scene: with all settings, or a short one with a comment how to get all.
-fn text(kind: &PhenomenonKind, all: bool) -> String {
+fn text(kind: &TableKind, all: bool) -> String {
     if all {
-        return template::commented(kind);
+        return template::commented(kind, KINDS);
     }
     let more = format!(
         "\n# The settings that are changed most often; `bansho new NAME --kind {} --all` writes every setting.\n",
         kind.key
     );
-    template::short(kind).replacen('\n', &more, 1)
+    template::short(kind, KINDS).replacen('\n', &more, 1)
 }
 
 fn list() -> String {
@@ -56,10 +62,10 @@ fn find(name: &str) -> Result<&'static ExampleScene, UsageError> {
 }
 
 /// The kind of phenomenon with this name; without a name, the first one.
-fn kind(name: Option<&str>) -> Result<&'static PhenomenonKind, UsageError> {
-    let names: Vec<&str> = KINDS.iter().map(|kind| kind.key).collect();
+fn kind(name: Option<&str>) -> Result<&'static TableKind, UsageError> {
+    let names: Vec<&str> = phenomena().map(|kind| kind.key).collect();
     let name = name.unwrap_or(names[0]);
-    KINDS.iter().find(|kind| kind.key == name).ok_or_else(|| unknown("phenomenon", name, &names))
+    phenomena().find(|kind| kind.key == name).ok_or_else(|| unknown("phenomenon", name, &names))
 }
 
 fn with_extension(name: &Path) -> PathBuf {

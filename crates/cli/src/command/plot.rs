@@ -22,7 +22,7 @@ use crate::{
     output::print,
     plot::{
         PlotError, aurora, beam, black_body, csv, deflection, draw, figure::Figure, flame_shape, kernel, metadata,
-        parameters, rain, texture::Texture, transfer_curves,
+        parameters, rain, texture::FigureTexture, transfer_curves,
     },
 };
 
@@ -137,7 +137,12 @@ fn finish(name: &str, figure: &Figure, output: &PlotOutputArgs, inputs: &[PathBu
 }
 
 /// Writes a texture as PNG, over none of its `inputs`.
-fn finish_texture(name: &str, texture: &Texture, output: &PlotOutputArgs, inputs: &[PathBuf]) -> anyhow::Result<()> {
+fn finish_texture(
+    name: &str,
+    texture: &FigureTexture,
+    output: &PlotOutputArgs,
+    inputs: &[PathBuf],
+) -> anyhow::Result<()> {
     let path = output_path(name, "png", output);
     if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(PlotError::TextureExtension { path }.into());
@@ -156,9 +161,9 @@ fn write(path: &Path, bytes: &[u8], output: &PlotOutputArgs, inputs: &[PathBuf])
         let path = path.to_path_buf();
         JobError::Option(match kept {
             OverwriteError::Input => OptionError::OutputIsInput { path },
-            OverwriteError::NotMadeByBansho => OptionError::NotMadeByBansho { path, others: 0 },
+            OverwriteError::NotMadeByBansho | OverwriteError::Link => OptionError::NotMadeByBansho { path, others: 0 },
         })
     })?;
-    atomic::write_bytes_with(path, bytes, &policy).map_err(JobError::from)?;
+    atomic::write_bytes(path, bytes, &policy).map_err(JobError::from)?;
     Ok(print(&format!("{}: written\n", printable(&path.display().to_string())))?)
 }

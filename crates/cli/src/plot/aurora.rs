@@ -11,7 +11,7 @@ use bansho::aurora::{
 
 use super::{
     csv::{number, rows},
-    figure::{Axis, Figure, Panel, Plot, Rgb, Series, Style, Table, bounds, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Rgb, Series, Style, bounds, color},
     ticks,
 };
 
@@ -39,7 +39,7 @@ fn line_color(line: &Line) -> Rgb {
 }
 
 /// An altitude axis that shows the profiles of some columns of a table whose first column is the altitude.
-fn altitude_axis(table: &Table, columns: &[usize]) -> Axis {
+fn altitude_axis(table: &FigureTable, columns: &[usize]) -> Axis {
     let reach = |&column: &usize| {
         let most = table.bounds(&[column]).map_or(0.0, |[_, high]| high);
         table.rows.iter().filter(|row| row[column] > FAINT * most).map(|row| row[0]).fold(LOWEST_KM, f64::max)
@@ -55,7 +55,7 @@ pub(crate) fn emission(energy_ev: f64, flux_mw_per_m2: f64, shape: SpectrumShape
         let name = line.name.to_lowercase().replace("n2+", "n2_ion").replace([' ', '.'], "_");
         format!("{name}_photons_per_m3_s")
     };
-    let mut table = Table::new(["altitude_km".to_owned()].into_iter().chain(LINES.iter().map(name)));
+    let mut table = FigureTable::new(["altitude_km".to_owned()].into_iter().chain(LINES.iter().map(name)));
     for (level, photons) in profile.iter().enumerate() {
         let rate = |line: &Line| flux_mw_per_m2 * line.photons * photons[line.emitter.index()];
         table.rows.push([level_altitude_km(level)].into_iter().chain(LINES.iter().map(rate)).collect());
@@ -93,7 +93,7 @@ fn pretty(name: &str) -> String {
 pub(crate) fn deposition(energies_ev: &[f64], shape: SpectrumShape) -> Figure {
     let deposition = Deposition::new(atmosphere(), shape.spectrum());
     let name = |energy: &f64| format!("q_{}_ev_per_m3_s_per_mw_m2", number(*energy));
-    let mut table = Table::new(["altitude_km".to_owned()].into_iter().chain(energies_ev.iter().map(name)));
+    let mut table = FigureTable::new(["altitude_km".to_owned()].into_iter().chain(energies_ev.iter().map(name)));
     for level in 0..atmosphere().levels().len() {
         let altitude_km = level_altitude_km(level);
         let rate = |energy: &f64| deposition.ionization(*energy, altitude_km);
@@ -143,7 +143,7 @@ const STATES: [(&str, &str, Rgb); 4] = [
 /// Fraction of the excited states that radiate before a collision quenches them, by altitude.
 pub(crate) fn quenching() -> Figure {
     let name = |state: &(&str, &str, Rgb)| format!("radiated_fraction_{}", state.1);
-    let mut table = Table::new(["altitude_km".to_owned()].into_iter().chain(STATES.iter().map(name)));
+    let mut table = FigureTable::new(["altitude_km".to_owned()].into_iter().chain(STATES.iter().map(name)));
     for (level, air) in atmosphere().levels().iter().enumerate() {
         let fractions = EMITTERS.map(|emitter| radiated_fraction(emitter, air));
         table.rows.push([&[level_altitude_km(level)][..], &fractions].concat());

@@ -14,7 +14,7 @@ use bansho::{
 use super::{
     PlotError,
     csv::number,
-    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, color},
 };
 
 /// Distances that are plotted, m.
@@ -33,7 +33,7 @@ pub(crate) fn figure(intensity: f64, [inner, outer]: [f64; 2], rates_mm_per_h: &
     let light = Light { emitter, intensity: [intensity as f32; 3] };
     let name = |rate: &f64| format!("lux_at_{}_mm_per_h", number(*rate));
     let columns = ["distance_m".to_owned()].into_iter().chain(rates_mm_per_h.iter().map(name));
-    let mut table = Table::new(columns.chain(["angle_deg", "intensity_cd"].map(str::to_owned)));
+    let mut table = FigureTable::new(columns.chain(["angle_deg", "intensity_cd"].map(str::to_owned)));
     let extinctions: Vec<f64> = rates_mm_per_h.iter().map(|rate| extinction_at(*rate)).collect();
     let last_angle = (1.2 * outer).min(180.0);
     for step in 0..=STEPS {

@@ -13,8 +13,8 @@ use crate::args::ColorTexture;
 use super::{
     PlotError,
     csv::rows,
-    figure::{Axis, ColorStrip, Figure, PALETTE, Panel, Plot, Rgb, Series, Style, Table},
-    texture::Texture,
+    figure::{Axis, ColorStrip, Figure, FigureTable, PALETTE, Panel, Plot, Rgb, Series, Style},
+    texture::FigureTexture,
     ticks,
 };
 
@@ -75,7 +75,7 @@ fn light(temperature_k: f64) -> Light {
 /// The figure.
 pub(crate) fn figure(temperatures: Temperatures) -> Result<Figure, PlotError> {
     let kelvins = temperatures.checked()?;
-    let mut table = Table::new([
+    let mut table = FigureTable::new([
         "temperature_k",
         "linear_srgb_r",
         "linear_srgb_g",
@@ -101,7 +101,7 @@ pub(crate) fn figure(temperatures: Temperatures) -> Result<Figure, PlotError> {
     })
 }
 
-fn luminance_plot(table: &Table, x: &Axis) -> Plot {
+fn luminance_plot(table: &FigureTable, x: &Axis) -> Plot {
     let points: Vec<[f64; 2]> = table.rows.iter().map(|row| [row[0], math::exp(row[7])]).collect();
     let brightest = points.iter().map(|point| point[1]).fold(10.0 * DARKEST, f64::max);
     let reference = rows::<5>(REFERENCE).iter().map(|row| [row[0], row[1]]).collect();
@@ -120,7 +120,7 @@ fn luminance_plot(table: &Table, x: &Axis) -> Plot {
     }
 }
 
-fn color_plot(table: &Table, x: &Axis) -> Plot {
+fn color_plot(table: &FigureTable, x: &Axis) -> Plot {
     let reference = rows::<5>(REFERENCE);
     let curve = |c: usize| Series {
         label: RGB[c].0.to_owned(),
@@ -155,7 +155,7 @@ fn strip(temperatures: Temperatures) -> Vec<Rgb> {
 
 /// The color of each temperature as a row of texels: linear sRGB without negative values, scaled such that its brightest channel is 1; black
 /// below [`DARKEST`].
-pub(crate) fn texture(temperatures: Temperatures, encoding: ColorTexture) -> Result<Texture, PlotError> {
+pub(crate) fn texture(temperatures: Temperatures, encoding: ColorTexture) -> Result<FigureTexture, PlotError> {
     let kelvins = temperatures.checked()?;
     let width = kelvins.len();
     let color = |kelvin: f64| {
@@ -164,8 +164,8 @@ pub(crate) fn texture(temperatures: Temperatures, encoding: ColorTexture) -> Res
     };
     let colors = kelvins.into_iter().map(color);
     Ok(match encoding {
-        ColorTexture::Srgb => Texture::srgb(width, colors.map(|color| color.map(|value| code(value as f32)))),
-        ColorTexture::Linear => Texture::linear_16(width, colors),
+        ColorTexture::Srgb => FigureTexture::srgb(width, colors.map(|color| color.map(|value| code(value as f32)))),
+        ColorTexture::Linear => FigureTexture::linear_16(width, colors),
     })
 }
 

@@ -1,15 +1,15 @@
 //! Tables as CSV (RFC 4180), and back.
 
-use bansho::media::files::provenance;
+use bansho::{base::host::printable::printable, media::files::provenance};
 
-use super::figure::Table;
+use super::figure::FigureTable;
 
 /// Digits that are written: more than single precision holds.
 const DIGITS: i32 = 8;
 
 /// A comment with the provenance mark and the title, a line of column names, then a line for each row.
-pub(crate) fn encode(title: &str, table: &Table) -> String {
-    let mut text = format!("# {}; {title}\n", provenance::COMMENT_TAG);
+pub(crate) fn encode(title: &str, table: &FigureTable) -> String {
+    let mut text = format!("# {}; {}\n", provenance::COMMENT_TAG, printable(title));
     let names: Vec<String> = table.columns.iter().map(|name| quoted(name)).collect();
     text += &names.join(",");
     text.push('\n');
@@ -31,7 +31,8 @@ pub(crate) fn rows<const N: usize>(text: &str) -> Vec<[f64; N]> {
 }
 
 fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+    let name = printable(name);
+    if name.contains([',', '"']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.into_owned() }
 }
 
 /// A number in the fewest digits, up to [`DIGITS`]; nothing for one that is not finite.
@@ -83,7 +84,7 @@ mod tests {
 
     #[test]
     fn names_with_commas_are_quoted() {
-        let table = Table { columns: vec!["a, \"b\"".into(), "c".into()], rows: vec![vec![1.0, f64::NAN]] };
+        let table = FigureTable { columns: vec!["a, \"b\"".into(), "c".into()], rows: vec![vec![1.0, f64::NAN]] };
         assert!(encode("t", &table).ends_with("; t\n\"a, \"\"b\"\"\",c\n1,\n"));
     }
 }

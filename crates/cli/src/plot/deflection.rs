@@ -10,13 +10,13 @@ use bansho::{
 
 use super::{
     PlotError,
-    texture::{Texture, signed_code},
+    texture::{FigureTexture, signed_code},
 };
 
 /// The deflection of one frame.
-pub(crate) struct Deflection {
+pub(crate) struct DeflectionFigure {
     /// x to the right, y up and z, which is 0, as red, green and blue.
-    pub(crate) texture: Texture,
+    pub(crate) texture: FigureTexture,
     /// Largest deflection, rad.
     pub(crate) largest_rad: f64,
     /// The same, in pixels of what is far behind the gas.
@@ -29,7 +29,11 @@ pub(crate) struct Deflection {
 ///
 /// # Errors
 /// The scene is faulty, or nothing in the frame refracts light.
-pub(crate) fn deflection(file: &SceneFile, number: i64, full_scale_rad: Option<f64>) -> anyhow::Result<Deflection> {
+pub(crate) fn deflection(
+    file: &SceneFile,
+    number: i64,
+    full_scale_rad: Option<f64>,
+) -> anyhow::Result<DeflectionFigure> {
     let compiled = file.compile(file.parse()?, &file.assets())?;
     let options = PlanOptions { aovs: true, ..PlanOptions::default() };
     let plan = Arc::new(Plan::new(&compiled, &options).map_err(JobError::from)?);
@@ -44,8 +48,8 @@ pub(crate) fn deflection(file: &SceneFile, number: i64, full_scale_rad: Option<f
     }
     let full_scale_rad = full_scale_rad.unwrap_or_else(|| largest(&mut x.iter().chain(&y).map(|value| value.abs())));
     let texel = |(x, y): (&f64, &f64)| [x / full_scale_rad, y / full_scale_rad, 0.0].map(signed_code);
-    Ok(Deflection {
-        texture: Texture::linear_8(frame.beauty.width(), x.iter().zip(&y).map(texel)),
+    Ok(DeflectionFigure {
+        texture: FigureTexture::linear_8(frame.beauty.width(), x.iter().zip(&y).map(texel)),
         largest_rad,
         largest_pixels: largest_rad * focal_pixels,
         full_scale_rad,

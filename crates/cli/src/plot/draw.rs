@@ -3,7 +3,7 @@
 use bansho::{DisplayImage, base::math};
 
 use super::{
-    canvas::{Anchor, Canvas, Stroke, TextStyle},
+    canvas::{FigureCanvas, LineStyle, TextAnchor, TextStyle},
     figure::{Axis, ColorStrip, Figure, Panel, Plot, Rgb, Scale, Series, Style},
     font,
     raster::RasterCanvas,
@@ -35,8 +35,8 @@ const CAP_HEIGHT: f64 = 0.69;
 
 const BLACK: Rgb = [0; 3];
 const GRID: Rgb = [226; 3];
-const AXIS: Stroke = Stroke { color: BLACK, width: 1.0, dash: None };
-const GRID_LINE: Stroke = Stroke { color: GRID, width: 0.7, dash: None };
+const AXIS: LineStyle = LineStyle { color: BLACK, width: 1.0, dash: None };
+const GRID_LINE: LineStyle = LineStyle { color: GRID, width: 0.7, dash: None };
 const CURVE_WIDTH: f64 = 1.8;
 const DASHES: [f64; 2] = [6.0, 3.5];
 const MARKER_RADIUS: f64 = 3.2;
@@ -81,10 +81,10 @@ fn size(figure: &Figure) -> [f64; 2] {
     [WIDTH, TOP + panels.map(|(index, panel)| panel_height(figure, panel) + below(index)).sum::<f64>()]
 }
 
-fn draw(figure: &Figure, canvas: &mut dyn Canvas) {
+fn draw(figure: &Figure, canvas: &mut dyn FigureCanvas) {
     let title = TextStyle {
         at: [0.5 * (LEFT + WIDTH - RIGHT), 23.0],
-        anchor: Anchor::Middle,
+        anchor: TextAnchor::Middle,
         size: TITLE_SIZE.min(TITLE_SIZE * (WIDTH - 16.0) / (WIDER * font::width(&figure.title, TITLE_SIZE)).max(1.0)),
         bold: true,
         vertical: false,
@@ -151,7 +151,7 @@ fn position(plot: &Plot, area: &Area, [x, y]: [f64; 2]) -> [f64; 2] {
     ]
 }
 
-fn draw_plot(plot: &Plot, area: &Area, labels_x: bool, canvas: &mut dyn Canvas) {
+fn draw_plot(plot: &Plot, area: &Area, labels_x: bool, canvas: &mut dyn FigureCanvas) {
     let rows = if area.bottom - area.top > 200.0 { 7 } else { 5 };
     let (x_ticks, y_ticks) = (ticks::ticks(&plot.x, 8), ticks::ticks(&plot.y, rows));
     let x_of = |value: f64| math::lerp(area.left, area.right, fraction(&plot.x, value));
@@ -176,7 +176,7 @@ fn draw_plot(plot: &Plot, area: &Area, labels_x: bool, canvas: &mut dyn Canvas) 
     }
     for (value, label) in &y_ticks.major {
         let at = [area.left - 7.0, y_of(*value) + 0.5 * CAP_HEIGHT * NUMBER_SIZE];
-        canvas.text(label, &number(at, Anchor::End));
+        canvas.text(label, &number(at, TextAnchor::End));
     }
     if labels_x {
         draw_x_labels(&plot.x, &x_ticks, x_of, area, canvas);
@@ -185,7 +185,7 @@ fn draw_plot(plot: &Plot, area: &Area, labels_x: bool, canvas: &mut dyn Canvas) 
     draw_legend(plot, area, &drawn, canvas);
 }
 
-fn draw_strip(strip: &ColorStrip, area: &Area, labels_x: bool, canvas: &mut dyn Canvas) {
+fn draw_strip(strip: &ColorStrip, area: &Area, labels_x: bool, canvas: &mut dyn FigureCanvas) {
     let edge = |index: usize| math::lerp(area.left, area.right, index as f64 / strip.colors.len() as f64);
     for (index, &color) in strip.colors.iter().enumerate() {
         // A little overlap, so that nothing shines through between neighbors.
@@ -203,7 +203,7 @@ fn draw_strip(strip: &ColorStrip, area: &Area, labels_x: bool, canvas: &mut dyn 
     }
 }
 
-fn draw_frame(area: &Area, canvas: &mut dyn Canvas) {
+fn draw_frame(area: &Area, canvas: &mut dyn FigureCanvas) {
     canvas.line(&area.outline(), &AXIS);
 }
 
@@ -213,7 +213,7 @@ fn sized(ticks: &Ticks) -> impl Iterator<Item = (f64, f64)> {
     ticks.major.iter().map(|&(value, _)| (MAJOR_TICK, value)).chain(minor)
 }
 
-fn draw_x_ticks(ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &Area, canvas: &mut dyn Canvas) {
+fn draw_x_ticks(ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &Area, canvas: &mut dyn FigureCanvas) {
     for (length, value) in sized(ticks) {
         let x = x_of(value);
         canvas.line(&[[x, area.bottom], [x, area.bottom - length]], &AXIS);
@@ -221,13 +221,13 @@ fn draw_x_ticks(ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &Area, canvas: &
     }
 }
 
-fn draw_x_labels(axis: &Axis, ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &Area, canvas: &mut dyn Canvas) {
+fn draw_x_labels(axis: &Axis, ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &Area, canvas: &mut dyn FigureCanvas) {
     for (value, label) in &ticks.major {
-        canvas.text(label, &number([x_of(*value), area.bottom + 17.0], Anchor::Middle));
+        canvas.text(label, &number([x_of(*value), area.bottom + 17.0], TextAnchor::Middle));
     }
     let style = TextStyle {
         at: [0.5 * (area.left + area.right), area.bottom + 37.0],
-        anchor: Anchor::Middle,
+        anchor: TextAnchor::Middle,
         size: LABEL_SIZE,
         bold: false,
         vertical: false,
@@ -236,7 +236,7 @@ fn draw_x_labels(axis: &Axis, ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &A
 }
 
 /// Beside the axis: in one line, or a long label above its unit.
-fn draw_y_caption(axis: &Axis, ticks: &Ticks, area: &Area, canvas: &mut dyn Canvas) {
+fn draw_y_caption(axis: &Axis, ticks: &Ticks, area: &Area, canvas: &mut dyn FigureCanvas) {
     let room = area.bottom - area.top;
     let (whole, unit) =
         (axis.caption(&ticks.factor), Axis { label: String::new(), ..axis.clone() }.caption(&ticks.factor));
@@ -248,7 +248,7 @@ fn draw_y_caption(axis: &Axis, ticks: &Ticks, area: &Area, canvas: &mut dyn Canv
     for (line, x) in lines {
         let style = TextStyle {
             at: [x, 0.5 * (area.top + area.bottom)],
-            anchor: Anchor::Middle,
+            anchor: TextAnchor::Middle,
             size: LABEL_SIZE.min(LABEL_SIZE * room / (WIDER * font::width(&line, LABEL_SIZE)).max(1.0)),
             bold: false,
             vertical: true,
@@ -258,21 +258,21 @@ fn draw_y_caption(axis: &Axis, ticks: &Ticks, area: &Area, canvas: &mut dyn Canv
 }
 
 /// Style of numbers and legends.
-fn number(at: [f64; 2], anchor: Anchor) -> TextStyle {
+fn number(at: [f64; 2], anchor: TextAnchor) -> TextStyle {
     TextStyle { at, anchor, size: NUMBER_SIZE, bold: false, vertical: false }
 }
 
-fn stroke(series: &Series) -> Stroke {
+fn stroke(series: &Series) -> LineStyle {
     let (width, dash) = match series.style {
         Style::Line => (CURVE_WIDTH, None),
         Style::Dashed => (CURVE_WIDTH, Some(DASHES)),
         Style::Markers => (1.3, None),
     };
-    Stroke { color: series.color, width, dash }
+    LineStyle { color: series.color, width, dash }
 }
 
 /// Draws a series; returns the page positions that it covers.
-fn draw_series(series: &Series, points: &[[f64; 2]], area: &Area, canvas: &mut dyn Canvas) -> Vec<[f64; 2]> {
+fn draw_series(series: &Series, points: &[[f64; 2]], area: &Area, canvas: &mut dyn FigureCanvas) -> Vec<[f64; 2]> {
     let stroke = stroke(series);
     if series.style == Style::Markers {
         let shown: Vec<[f64; 2]> = points.iter().copied().filter(|&point| area.contains(point)).collect();
@@ -343,7 +343,7 @@ const SAMPLE: f64 = 26.0;
 const PADDING: f64 = 7.0;
 
 /// Draws the legend in the corner, or in the middle of a side, where it hides the fewest of the `drawn` positions. One curve needs none.
-fn draw_legend(plot: &Plot, area: &Area, drawn: &[[f64; 2]], canvas: &mut dyn Canvas) {
+fn draw_legend(plot: &Plot, area: &Area, drawn: &[[f64; 2]], canvas: &mut dyn FigureCanvas) {
     if plot.series.len() < 2 {
         return;
     }
@@ -359,7 +359,7 @@ fn draw_legend(plot: &Plot, area: &Area, drawn: &[[f64; 2]], canvas: &mut dyn Ca
     let hidden = |area: &Area| drawn.iter().filter(|&&point| area.grown(6.0).contains(point)).count();
     let Some(place) = candidates.min_by_key(hidden) else { return };
     canvas.rectangle(place.corners(), [255; 3], 0.85);
-    canvas.line(&place.outline(), &Stroke { color: [190; 3], width: 0.7, dash: None });
+    canvas.line(&place.outline(), &LineStyle { color: [190; 3], width: 0.7, dash: None });
     for (index, series) in plot.series.iter().enumerate() {
         let y = place.top + 0.5 * PADDING + LINE_HEIGHT * (index as f64 + 0.5);
         let left = place.left + PADDING;
@@ -368,7 +368,7 @@ fn draw_legend(plot: &Plot, area: &Area, drawn: &[[f64; 2]], canvas: &mut dyn Ca
             _ => canvas.line(&[[left, y], [left + SAMPLE, y]], &stroke(series)),
         }
         let at = [left + SAMPLE + PADDING, y + 0.5 * CAP_HEIGHT * NUMBER_SIZE];
-        canvas.text(&series.label, &number(at, Anchor::Start));
+        canvas.text(&series.label, &number(at, TextAnchor::Start));
     }
 }
 

@@ -10,7 +10,7 @@ pub(crate) struct Figure {
     /// From top to bottom.
     pub(crate) panels: Vec<Panel>,
     /// All numbers that it shows, for CSV.
-    pub(crate) table: Table,
+    pub(crate) table: FigureTable,
 }
 
 /// A part of a figure with axes of its own. If the panel below has the same x axis, only that one labels it.
@@ -153,14 +153,14 @@ pub(crate) fn pretty_unit(unit: &str) -> String {
 
 /// Numbers in rows and columns.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Table {
+pub(crate) struct FigureTable {
     /// Name of each column, with its unit.
     pub(crate) columns: Vec<String>,
     /// One number per column; one that is not finite is an empty cell.
     pub(crate) rows: Vec<Vec<f64>>,
 }
 
-impl Table {
+impl FigureTable {
     /// A table without rows.
     pub(crate) fn new(columns: impl IntoIterator<Item = impl Into<String>>) -> Self {
         Self { columns: columns.into_iter().map(Into::into).collect(), rows: Vec::new() }

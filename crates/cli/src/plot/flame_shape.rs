@@ -8,7 +8,7 @@ use bansho::{
 };
 
 use super::{
-    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, color},
     transfer_curves::flame_sheet,
 };
 
@@ -39,7 +39,7 @@ pub(crate) fn figure(file: &SceneFile, name: Option<&str>, time: f64, height: f6
     let sheet = FlameSheet::new(parameters.clone(), &name, scene.seed, None);
     let sheet = sheet.map_err(|error| located(file, &scene, &name, error))?;
     let edges = sheet.edges(time);
-    let mut table = Table::new(COLUMNS);
+    let mut table = FigureTable::new(COLUMNS);
     for index in 0..=SAMPLES {
         let s = index as f64 / SAMPLES as f64;
         table.rows.push([row(&parameters, s, height), edges(s).to_vec()].concat());
@@ -75,7 +75,7 @@ fn row(parameters: &FlameSheetParameters, s: f64, height: f64) -> Vec<f64> {
     ]
 }
 
-fn panels(table: &Table, time: f64, height: f64) -> Vec<Panel> {
+fn panels(table: &FigureTable, time: f64, height: f64) -> Vec<Panel> {
     let plot = |x: &str, y: &str, curves: &[(&str, usize)]| {
         let series = |(index, (label, column)): (usize, &(&str, usize))| Series {
             label: (*label).to_owned(),

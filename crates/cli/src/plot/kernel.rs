@@ -7,8 +7,8 @@ use bansho::{
 };
 
 use super::{
-    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, color},
-    texture::{Texture, signed_code, unsigned_code},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, color},
+    texture::{FigureTexture, signed_code, unsigned_code},
 };
 
 /// Rows of the table, without the first.
@@ -31,7 +31,7 @@ fn steepest_gradient() -> f64 {
 
 /// The figure: kernel, gradient, and their line integrals, by which Bansho draws gas.
 pub(crate) fn figure() -> Figure {
-    let mut table = Table::new([
+    let mut table = FigureTable::new([
         "r_per_d",
         "poly6_times_d3",
         "poly6_gradient_times_d4",
@@ -69,18 +69,18 @@ fn texel_centers(size: usize) -> impl Iterator<Item = [f64; 2]> {
 }
 
 /// Poly6 over a square of side 2 d, scaled to 1 at the center: figure 2.
-pub(crate) fn density_texture(size: usize) -> Texture {
+pub(crate) fn density_texture(size: usize) -> FigureTexture {
     let texel = |[x, y]: [f64; 2]| [unsigned_code(poly6(math::hypot(x, y)) / poly6(0.0)); 3];
-    Texture::linear_8(size, texel_centers(size).map(texel))
+    FigureTexture::linear_8(size, texel_centers(size).map(texel))
 }
 
 /// Direction in which a particle deflects light, outward, over a square of side 2 d, scaled to 1 where it is largest: figure 3. In the plane
 /// through the particle nothing is deflected along z.
-pub(crate) fn deflection_texture(size: usize) -> Texture {
+pub(crate) fn deflection_texture(size: usize) -> FigureTexture {
     let texel = |[x, y]: [f64; 2]| {
         let r = math::hypot(x, y);
         let outward = -poly6_gradient(r) / (steepest_gradient() * r.max(f64::MIN_POSITIVE));
         [x * outward, y * outward, 0.0].map(signed_code)
     };
-    Texture::linear_8(size, texel_centers(size).map(texel))
+    FigureTexture::linear_8(size, texel_centers(size).map(texel))
 }

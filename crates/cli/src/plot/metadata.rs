@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::{
     PlotError,
-    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, bounds, color, pretty_unit},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, bounds, color, pretty_unit},
     ticks,
 };
 
@@ -49,7 +49,7 @@ pub(crate) fn figure(paths: &[PathBuf]) -> Result<Figure, PlotError> {
         let unit = if quantity.unit.is_empty() { String::new() } else { format!(" ({})", quantity.unit) };
         format!("{} {}{unit}", quantity.phenomenon, quantity.name)
     };
-    let mut table = Table::new(["frame".to_owned()].into_iter().chain(quantities.iter().map(column)));
+    let mut table = FigureTable::new(["frame".to_owned()].into_iter().chain(quantities.iter().map(column)));
     for (frame, numbers) in &frames {
         let value = |quantity: &Quantity| numbers.get(quantity).copied().unwrap_or(f64::NAN);
         table.rows.push([*frame as f64].into_iter().chain(quantities.iter().map(value)).collect());

@@ -6,17 +6,16 @@ use bansho::{
     KINDS, SceneError,
     base::{
         math::curve::{Curve, Interpolation},
-        parameters::{
-            Descriptor, InterpolationName, Kind, ModelError, Node, ProblemKind, Table as SceneTable, Value, nearest,
-        },
+        parameters::{Descriptor, InterpolationName, Kind, ModelError, Node, ProblemKind, Table, Value, nearest},
+        tables,
     },
     job::{JobError, SceneFile},
-    scene::{SHARED_TABLES, parse_values},
+    scene::parse_values,
 };
 
 use super::{
     PlotError, did_you_mean,
-    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, bounds, color, pretty_unit},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, bounds, color, pretty_unit},
     ticks,
 };
 
@@ -73,7 +72,7 @@ fn matches(steps: &[Step], path: &[&str]) -> bool {
 }
 
 /// Every value of a scene; keyed values are not entered.
-fn all_values<'a>(table: &'a SceneTable, steps: &[Step], found: &mut Vec<Stated<'a>>) {
+fn all_values<'a>(table: &'a Table, steps: &[Step], found: &mut Vec<Stated<'a>>) {
     for entry in &table.entries {
         add_value(&entry.node, [steps, &[Step::Key(entry.key.clone())]].concat(), found);
     }
@@ -164,11 +163,8 @@ fn unit(steps: &[Step]) -> &'static str {
         Step::Item { .. } => None,
     });
     let root = keys.next().unwrap_or_default();
-    let shared = SHARED_TABLES.iter().find(|table| table.key == root).map(|table| table.table);
-    let Some(table) = shared.or_else(|| KINDS.iter().find(|kind| kind.key == root).map(|kind| kind.table)) else {
-        return "";
-    };
-    let mut parameters: &[Descriptor] = &table().parameters;
+    let Some(kind) = tables::find(KINDS, root) else { return "" };
+    let mut parameters: &[Descriptor] = &(kind.table)().parameters;
     let mut unit = "";
     for key in keys {
         let Some(descriptor) = parameters.iter().find(|descriptor| descriptor.key == key) else { break };
@@ -206,7 +202,7 @@ pub(crate) fn figure(file: &SceneFile, paths: &[String]) -> anyhow::Result<Figur
         return Err(PlotError::Rows { option: "picture.frames", rows: frames as f64, most: MOST_ROWS as f64 }.into());
     }
     let end = frames as f64 * picture.fps.frame_s();
-    let mut table = Table::new(["frame", "time_s"]);
+    let mut table = FigureTable::new(["frame", "time_s"]);
     table.rows = (0..=frames)
         .map(|index| vec![picture.first_frame as f64 + index as f64, index as f64 * picture.fps.frame_s()])
         .collect();
@@ -230,7 +226,7 @@ fn drawn(curve: &Curve, at_frames: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 /// The plot of one keyed parameter; its values are added to the table.
-fn parameter_plot(stated: &Stated, x: &Axis, table: &mut Table) -> Plot {
+fn parameter_plot(stated: &Stated, x: &Axis, table: &mut FigureTable) -> Plot {
     let (path, unit, curves) = (stated.path(), unit(&stated.steps), curves(stated.node));
     let names: &[&str] = if curves.len() == 1 { &[""] } else { &["x", "y", "z", "w"] };
     let mut series = Vec::new();

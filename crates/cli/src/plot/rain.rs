@@ -10,7 +10,7 @@ use bansho::rain::{
 
 use super::{
     csv::{number, rows},
-    figure::{Axis, Figure, Panel, Plot, Series, Style, Table, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, color},
     ticks,
 };
 
@@ -36,7 +36,7 @@ fn diameter_axis() -> Axis {
 }
 
 /// A column of `points` beside the rows of the same abscissa.
-fn add_reference(table: &mut Table, name: String, points: &[[f64; 2]]) {
+fn add_reference(table: &mut FigureTable, name: String, points: &[[f64; 2]]) {
     table.columns.push(name);
     for row in &mut table.rows {
         let found = points.iter().find(|point| (point[0] - row[0]).abs() < 1e-9);
@@ -47,7 +47,7 @@ fn add_reference(table: &mut Table, name: String, points: &[[f64; 2]]) {
 /// Drop size distributions of Marshall and Palmer (1948), eq. (1), at rain rates in mm/h.
 pub(crate) fn drop_sizes(rates_mm_per_h: &[f64]) -> Figure {
     let name = |rate: &f64| format!("n_at_{}_mm_per_h_per_m3_mm", number(*rate));
-    let mut table = Table::new(["diameter_mm".to_owned()].into_iter().chain(rates_mm_per_h.iter().map(name)));
+    let mut table = FigureTable::new(["diameter_mm".to_owned()].into_iter().chain(rates_mm_per_h.iter().map(name)));
     let distributions: Vec<_> =
         rates_mm_per_h.iter().map(|rate| DropSizeDistribution::marshall_palmer(*rate)).collect();
     for diameter in diameters_mm() {
@@ -88,7 +88,7 @@ pub(crate) fn terminal_velocity() -> Figure {
     diameters.extend(measured.iter().map(|point| point[0]));
     diameters.sort_by(f64::total_cmp);
     diameters.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-    let mut table = Table::new(["diameter_mm", "gunn_kinzer_m_per_s", "rigid_sphere_m_per_s"]);
+    let mut table = FigureTable::new(["diameter_mm", "gunn_kinzer_m_per_s", "rigid_sphere_m_per_s"]);
     for diameter in diameters {
         table.rows.push(vec![diameter, laws[0].speed(diameter), laws[1].speed(diameter)]);
     }
@@ -124,7 +124,7 @@ pub(crate) fn terminal_velocity() -> Figure {
 pub(crate) fn streak_opacity(exposure_times_s: &[f64], law: VelocityLaw) -> Figure {
     let velocity = TerminalVelocity { law, air: FallAir::default() };
     let name = |time: &f64| format!("opacity_at_{}_s", number(*time));
-    let mut table = Table::new(["diameter_mm".to_owned()].into_iter().chain(exposure_times_s.iter().map(name)));
+    let mut table = FigureTable::new(["diameter_mm".to_owned()].into_iter().chain(exposure_times_s.iter().map(name)));
     // A drop of no diameter has no streak.
     for diameter in diameters_mm().into_iter().filter(|diameter| *diameter >= 0.1) {
         let speed = velocity.speed(diameter);

@@ -1,11 +1,14 @@
 //! Figures as pixels.
 
 use ab_glyph::OutlineCurve;
-use bansho::{AlphaConvention, DisplayImage, base::frame::DisplayPixels};
+use bansho::{
+    AlphaConvention, DisplayImage,
+    base::frame::{DisplayEncoding, DisplayPixels},
+};
 use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, StrokeDash, Transform};
 
 use super::{
-    canvas::{Anchor, Canvas, Stroke, TextStyle},
+    canvas::{FigureCanvas, LineStyle, TextAnchor, TextStyle},
     figure::Rgb,
     font,
 };
@@ -37,10 +40,17 @@ impl RasterCanvas {
         // Opaque, so that premultiplied is straight.
         let pixels = self.pixmap.pixels().iter().map(|pixel| [pixel.red(), pixel.green(), pixel.blue(), 255]);
         let pixels = DisplayPixels::Eight(pixels.collect());
-        DisplayImage { width, height, opaque: true, alpha: AlphaConvention::default(), pixels }
+        DisplayImage {
+            width,
+            height,
+            opaque: true,
+            alpha: AlphaConvention::default(),
+            encoding: DisplayEncoding::Srgb,
+            pixels,
+        }
     }
 
-    fn stroke(&mut self, path: &Path, stroke: &Stroke, join: LineJoin) {
+    fn stroke(&mut self, path: &Path, stroke: &LineStyle, join: LineJoin) {
         let dash = stroke.dash.and_then(|lengths| StrokeDash::new(lengths.map(|length| length as f32).to_vec(), 0.0));
         let pen = tiny_skia::Stroke {
             width: stroke.width as f32,
@@ -61,8 +71,8 @@ fn paint(color: Rgb, opacity: f64) -> Paint<'static> {
     paint
 }
 
-impl Canvas for RasterCanvas {
-    fn line(&mut self, points: &[[f64; 2]], stroke: &Stroke) {
+impl FigureCanvas for RasterCanvas {
+    fn line(&mut self, points: &[[f64; 2]], stroke: &LineStyle) {
         let mut path = PathBuilder::new();
         for (index, point) in points.iter().enumerate() {
             let [x, y] = point.map(|value| value as f32);
@@ -81,7 +91,7 @@ impl Canvas for RasterCanvas {
         }
     }
 
-    fn marker(&mut self, [x, y]: [f64; 2], radius: f64, stroke: &Stroke) {
+    fn marker(&mut self, [x, y]: [f64; 2], radius: f64, stroke: &LineStyle) {
         let Some(circle) = PathBuilder::from_circle(x as f32, y as f32, radius as f32) else { return };
         let transform = Transform::from_scale(SCALE, SCALE);
         self.pixmap.fill_path(&circle, &paint([255; 3], 1.0), FillRule::Winding, transform, None);
@@ -92,9 +102,9 @@ impl Canvas for RasterCanvas {
         let (glyphs, width) = font::layout(text);
         let size = style.size as f32;
         let start = match style.anchor {
-            Anchor::Start => 0.0,
-            Anchor::Middle => -0.5 * width as f32,
-            Anchor::End => -(width as f32),
+            TextAnchor::Start => 0.0,
+            TextAnchor::Middle => -0.5 * width as f32,
+            TextAnchor::End => -(width as f32),
         };
         let [x, y] = style.at.map(|value| value as f32);
         let turn = if style.vertical { Transform::from_rotate(-90.0) } else { Transform::identity() };

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use bansho::media::files::provenance;
 
 use super::{
-    canvas::{Anchor, Canvas, Stroke, TextStyle},
+    canvas::{FigureCanvas, LineStyle, TextAnchor, TextStyle},
     figure::Rgb,
 };
 
@@ -34,8 +34,8 @@ impl SvgCanvas {
     }
 }
 
-impl Canvas for SvgCanvas {
-    fn line(&mut self, points: &[[f64; 2]], stroke: &Stroke) {
+impl FigureCanvas for SvgCanvas {
+    fn line(&mut self, points: &[[f64; 2]], stroke: &LineStyle) {
         let points: Vec<String> = points.iter().map(|&[x, y]| format!("{},{}", length(x), length(y))).collect();
         let _ = writeln!(
             self.text,
@@ -58,7 +58,7 @@ impl Canvas for SvgCanvas {
         );
     }
 
-    fn marker(&mut self, [x, y]: [f64; 2], radius: f64, stroke: &Stroke) {
+    fn marker(&mut self, [x, y]: [f64; 2], radius: f64, stroke: &LineStyle) {
         let _ = writeln!(
             self.text,
             "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"#ffffff\" {}/>",
@@ -72,9 +72,9 @@ impl Canvas for SvgCanvas {
     fn text(&mut self, text: &str, style: &TextStyle) {
         let [x, y] = style.at.map(length);
         let anchor = match style.anchor {
-            Anchor::Start => "start",
-            Anchor::Middle => "middle",
-            Anchor::End => "end",
+            TextAnchor::Start => "start",
+            TextAnchor::Middle => "middle",
+            TextAnchor::End => "end",
         };
         let weight = if style.bold { " font-weight=\"bold\"" } else { "" };
         let turned = if style.vertical { format!(" transform=\"rotate(-90 {x} {y})\"") } else { String::new() };
@@ -98,7 +98,7 @@ fn hexadecimal([r, g, b]: Rgb) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-fn outline(stroke: &Stroke) -> String {
+fn outline(stroke: &LineStyle) -> String {
     let dash = stroke.dash.map_or_else(String::new, |[on, off]| format!(" stroke-dasharray=\"{on} {off}\""));
     format!("stroke=\"{}\" stroke-width=\"{}\"{dash}", hexadecimal(stroke.color), length(stroke.width))
 }

@@ -1,17 +1,20 @@
 //! Pictures without axes, for shaders: rows of texels from the top.
 
-use bansho::{AlphaConvention, DisplayImage, base::frame::DisplayPixels};
+use bansho::{
+    AlphaConvention, DisplayImage,
+    base::frame::{DisplayEncoding, DisplayPixels},
+};
 
 use super::figure::Rgb;
 
 /// A texture.
-pub(crate) struct Texture {
+pub(crate) struct FigureTexture {
     pub(crate) picture: DisplayImage,
     /// Whether its codes are linear; otherwise they are sRGB-encoded.
     pub(crate) is_linear: bool,
 }
 
-impl Texture {
+impl FigureTexture {
     /// Codes of sRGB.
     pub(super) fn srgb(width: usize, texels: impl IntoIterator<Item = Rgb>) -> Self {
         Self { is_linear: false, ..Self::linear_8(width, texels) }
@@ -36,7 +39,14 @@ impl Texture {
             DisplayPixels::Sixteen(texels) => texels.len(),
         };
         let height = texels / width.max(1);
-        let picture = DisplayImage { width, height, opaque: true, alpha: AlphaConvention::default(), pixels };
+        let picture = DisplayImage {
+            width,
+            height,
+            opaque: true,
+            alpha: AlphaConvention::default(),
+            encoding: DisplayEncoding::Srgb,
+            pixels,
+        };
         Self { picture, is_linear: true }
     }
 }

@@ -14,7 +14,7 @@ use super::{
     PlotError,
     black_body::{RGB, code, display_color},
     did_you_mean,
-    figure::{Axis, ColorStrip, Figure, Panel, Plot, Rgb, Series, Style, Table, color},
+    figure::{Axis, ColorStrip, Figure, FigureTable, Panel, Plot, Rgb, Series, Style, color},
     ticks,
 };
 
@@ -59,7 +59,7 @@ pub(crate) fn figure(file: &SceneFile, name: Option<&str>) -> anyhow::Result<Fig
     let (name, sheet) = flame_sheet(file, &scene, name)?;
     let (light, is_display) = (sheet.color.light(), sheet.color.kind == Coloring::RgbCurves);
     let columns = ["s", "sharpen", "r", "g", "b"];
-    let mut table = Table::new(columns);
+    let mut table = FigureTable::new(columns);
     let mut colors = Vec::new();
     for index in 0..=CURVE_SAMPLES {
         let s = index as f64 / CURVE_SAMPLES as f64;

@@ -10,7 +10,7 @@ use bansho::job::{FrameDone, JobStarted};
 use serde_json::{Value, json};
 
 use super::JobResult;
-use crate::output::print;
+use crate::output::{json_text, print_all};
 
 #[derive(Default)]
 pub(super) struct Json {
@@ -40,14 +40,14 @@ impl Json {
         self.write(&json!({ "event": "error", "message": message, "code": code }));
     }
 
-    /// The first error of writing an event, if there was one. A closed pipe is not an error.
+    /// The first error of writing an event, if there was one. A closed pipe is one: whoever asked for events has missed some.
     pub(super) fn take_error(&self) -> Option<io::Error> {
         self.error.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// Writes an event. After an error the job continues, so that the pictures are not lost.
     pub(super) fn write(&self, event: &Value) {
-        if let Err(error) = print(&format!("{event}\n")) {
+        if let Err(error) = print_all(&format!("{}\n", json_text(event))) {
             self.error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         }
     }

@@ -6,6 +6,7 @@ use bansho::{
     Stage,
     base::host::{
         plural::counted,
+        printable::printable_excerpt,
         stage_times::{PartTimes, StageTimes},
     },
 };
@@ -27,8 +28,8 @@ struct Row {
 
 impl Row {
     fn label(&self) -> String {
-        let name = self.phenomenon.as_deref().unwrap_or("compositing");
-        if self.is_mirrored { format!("{name}, mirrored") } else { name.to_owned() }
+        let name = self.phenomenon.as_deref().map_or("compositing".into(), printable_excerpt);
+        if self.is_mirrored { format!("{name}, mirrored") } else { name.into_owned() }
     }
 
     fn write(label: &str, first: [f64; 3], median: Option<[f64; 3]>, table: &mut String) {

@@ -76,25 +76,6 @@ fn check_tells_of_every_scene() {
 }
 
 #[test]
-fn upgrade_states_the_format_keeps_comments_and_does_no_more() {
-    let folder = Folder::new();
-    folder.write("old.toml", "# mine\n[picture]\nframes = 3 # few\n");
-    let run = folder.succeed(&["upgrade", "old.toml"]);
-    assert!(run.stdout.contains("rewritten for format 2"), "{}", run.stdout);
-    let text = String::from_utf8(folder.files("")["old.toml"].clone()).unwrap();
-    assert_eq!(text, "bansho = 2\n# mine\n[picture]\nframes = 3 # few\n");
-    assert!(folder.succeed(&["upgrade", "old.toml"]).stdout.contains("unchanged"));
-    assert_eq!(folder.names(), ["old.toml"]);
-    folder.write("new.toml", "bansho = 99\n");
-    folder.write("broken.toml", "bansho = 2\n[\n");
-    for name in ["new.toml", "broken.toml"] {
-        let run = folder.run(&["upgrade", name]);
-        assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
-        assert!(run.stderr.contains(&format!("error: {name}:")), "{}", run.stderr);
-    }
-}
-
-#[test]
 fn the_schema_knows_the_keys_of_scenes() {
     let schema = Folder::new().succeed(&["schema"]).stdout;
     let schema: serde_json::Value = serde_json::from_str(&schema).unwrap();

@@ -299,6 +299,13 @@ fn arrays_are_no_larger_than_the_cluster_allows() {
     assert_eq!(automatic.code, Some(0), "{}", automatic.stderr);
 }
 
+/// The text of a plan with `old` replaced, and with the digest of what it says then.
+fn signed_again(text: &str, old: &str, new: &str) -> String {
+    let edited = text.replace(old, new);
+    let (start, _) = edited.split_once(",\n  \"digest\"").expect("a digest at the end");
+    format!("{start},\n  \"digest\": \"{}\"\n}}\n", blake3::hash(start.as_bytes()).to_hex())
+}
+
 #[test]
 fn tasks_of_another_scene_folder_or_plan_refuse() {
     let folder = folder();
@@ -314,11 +321,11 @@ fn tasks_of_another_scene_folder_or_plan_refuse() {
     let plan_file = "out/scene/scene.farm/plan.json";
     let text = read(&folder, plan_file);
     let version = format!("Bansho {}", env!("CARGO_PKG_VERSION"));
-    folder.write(plan_file, &text.replace(&version, "Bansho 0.0.1"));
+    folder.write(plan_file, &signed_again(&text, &version, "Bansho 0.0.1"));
     let other = batch(&folder, "frames.sbatch", 1);
     assert!(other.stderr.contains(&format!("this machine runs {version}")), "{}", other.stderr);
     let arithmetic = serde_json::from_str::<Value>(&text).unwrap()["arithmetic"].as_str().unwrap().to_owned();
-    folder.write(plan_file, &text.replace(&arithmetic, "00"));
+    folder.write(plan_file, &signed_again(&text, &arithmetic, "00"));
     let other = batch(&folder, "frames.sbatch", 1);
     assert!(other.stderr.contains("this machine draws other bytes"), "{}", other.stderr);
     folder.write(plan_file, "{");

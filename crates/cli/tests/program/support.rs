@@ -76,8 +76,13 @@ impl Folder {
     /// Contents of the files of a folder in it.
     pub(crate) fn files(&self, folder: &str) -> BTreeMap<String, Vec<u8>> {
         let folder = self.path(folder);
-        names(&folder).into_iter().map(|name| (name.clone(), fs::read(folder.join(&name)).unwrap())).collect()
+        names(&folder).into_iter().map(|name| (name.clone(), contents(&folder.join(&name)))).collect()
     }
+}
+
+/// Contents of a file; of a link that leads nowhere, where it leads.
+fn contents(path: &Path) -> Vec<u8> {
+    fs::read(path).unwrap_or_else(|_| fs::read_link(path).unwrap().into_os_string().into_encoded_bytes())
 }
 
 fn names(folder: &Path) -> Vec<String> {

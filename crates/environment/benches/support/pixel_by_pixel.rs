@@ -1,4 +1,4 @@
-//! The ground one pixel at a time in double precision: the naive twin of `ground`, without obstacles and plates.
+//! The ground one pixel at a time in double precision: the naive version of `ground`, without obstacles and plates.
 //!
 //! The equations are those of the table in `ground/mod.rs`; every pixel evaluates all of them again.
 

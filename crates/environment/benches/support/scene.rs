@@ -9,7 +9,7 @@ use bansho_base::{
         surroundings::{Emitter, Light, Reflection, Surroundings},
     },
     world::{
-        sky::{SkyKind, SkyParameters},
+        sky::{Sky, SkyKind},
         wind::Wind,
     },
 };
@@ -28,8 +28,8 @@ pub(crate) fn view(size: [usize; 2]) -> View {
 
 /// Two headlights and two street lamps under a dusky sky.
 pub(crate) fn surroundings<'a>(wind: &'a Wind, reflection: Option<&'a Reflection>) -> Surroundings<'a> {
-    let sky = SkyParameters { kind: SkyKind::Overcast, luminance: 0.5.into(), ..SkyParameters::default() };
-    let mut surroundings = Surroundings { sky: sky.at(0.0), reflection, ..Surroundings::from_wind(wind) };
+    let sky = Sky::new(SkyKind::Overcast, 0.5, 7000.0);
+    let mut surroundings = Surroundings { sky, reflection, ..Surroundings::from_wind(wind) };
     let at = |x: f64, y: f64, z: f64| DVec3::new(1202.0 + x, y, -816.0 + z);
     let spot = |x: f64| Emitter::Spot {
         position: at(x, 0.65, -6.0),

@@ -49,6 +49,10 @@ impl Run for Ground {
         vec![DepthInterval { near: 0.0, far: HORIZON }]
     }
 
+    fn exposure_parts(&self, view: &View, surroundings: &Surroundings) -> usize {
+        self.parts_of_exposure(view, surroundings)
+    }
+
     fn prepare<'a>(
         &'a self,
         view: &'a View,

@@ -13,6 +13,7 @@ use bansho_base::{
         strip::View,
         surroundings::{Backdrop, Surroundings},
     },
+    world::sky::SkyObserver,
 };
 use fearless_simd::prelude::*;
 
@@ -252,7 +253,7 @@ impl PreparedGround<'_> {
             return planes;
         }
         let mut planes = [[0.0; LANES]; 3];
-        let tabulate = || sky.night().map(|night| NightSky::new(sky, night, 0.0));
+        let tabulate = || sky.night().map(|night| NightSky::new(sky, night, 0.0, SkyObserver::ON_THE_GROUND));
         if let Some(night_sky) = self.night_sky.get_or_init(tabulate) {
             let colors = night_sky.radiance(simd, &Directions { components: toward, visible: [true; LANES] });
             for i in 0..LANES {

@@ -130,8 +130,7 @@ fn any(values: &[f32; LANES]) -> bool {
 /// Smooth step from 0 at `low` to 1 at `high`.
 #[inline(always)]
 pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
-    let t = ((x - low) / (high - low)).simd_clamp01();
-    t * t * (-2.0_f32).fma(t, 3.0)
+    ((x - low) / (high - low)).simd_smoothstep()
 }
 
 impl Surface {

@@ -70,8 +70,7 @@ impl Waves {
             let fraction = index as f64 / (WAVE_COUNT - 1) as f64;
             let length = longest * math::pow(LENGTH_RATIO, -fraction);
             let along = heading.rotate(unit_vector((2.0 * turn - 1.0) * MAX_ANGLE));
-            // Dispersion relation of deep water: omega^2 = g k.
-            let frequency = quantize_frequency(math::sqrt(STANDARD_GRAVITY * TAU / length) / TAU, loop_s) * t;
+            let frequency = quantize_frequency(frequency(length), loop_s) * t;
             let amplitude = slope * math::sqrt(2.0 / WAVE_COUNT as f64);
             let turns = (along.dot(origin) / length).rem_euclid(1.0) + phase - frequency.rem_euclid(1.0);
             Wave {
@@ -110,6 +109,16 @@ impl Waves {
         }
         slopes
     }
+}
+
+/// Frequency of a deep-water wave of a length in m, 1/s: omega^2 = g k.
+fn frequency(length: f64) -> f64 {
+    math::sqrt(STANDARD_GRAVITY * TAU / length) / TAU
+}
+
+/// Frequency of the shortest waves, 1/s, where the longest have a length of `longest` m.
+pub(super) fn highest_frequency(longest: f64) -> f64 {
+    frequency(longest / LENGTH_RATIO)
 }
 
 /// Rounds a frequency (1/s) to a whole number of periods in the loop.

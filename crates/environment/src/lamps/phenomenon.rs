@@ -45,6 +45,10 @@ impl Run for Lamps {
         discs.iter().filter_map(|lamp| project_lamp(lamp, view)).map(depth).collect()
     }
 
+    fn exposure_parts(&self, view: &View, _surroundings: &Surroundings) -> usize {
+        self.parts_of_exposure(view)
+    }
+
     fn prepare<'a>(
         &'a self,
         view: &'a View,

@@ -1,6 +1,7 @@
 //! Draws lamps as discs, with the glare of the lens around them.
 
 use bansho_base::{
+    camera::angular_distance::{AngularDistance, chord},
     color,
     image::Rect,
     math::{self, DVec2, MulAdd, simd::LANES},
@@ -25,7 +26,7 @@ pub(super) const GLARE_FRACTION: f64 = 0.0012;
 pub(super) const GLARE_ANGLES: [f64; 2] = [0.002, 0.12];
 
 /// Luminance of the glare by angle from a lamp, for each lux that arrives from it: `k / (theta^2 + a^2)^(3/2)`, faded
-/// to 0 at the end.
+/// to 0 at the end. Angles are measured as chords, 2 sin(theta / 2).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glare {
     /// a^2.
@@ -35,7 +36,7 @@ pub(super) struct Glare {
 }
 
 impl Glare {
-    /// Square of the angle at which it ends.
+    /// Square of the chord at which it ends.
     pub(super) const END: f64 = GLARE_ANGLES[1] * GLARE_ANGLES[1];
 
     /// The glare of a lamp with this angular radius, radians.
@@ -49,17 +50,15 @@ impl Glare {
         Self { core: c, strength: GLARE_FRACTION / (std::f64::consts::PI * whole) }
     }
 
-    /// The glare in sixteen pixels of a row: the first is at the angles `x` and `y` from the lamp, each at the angle `step` from the one before.
+    /// The glare at sixteen angles from the lamp, given as squares of chords.
     #[inline(always)]
-    pub(super) fn at_sixteen(&self, [x, y, step]: [f32; 3]) -> [f32; LANES] {
+    pub(super) fn at_sixteen(&self, squares: [f32; LANES]) -> [f32; LANES] {
         let (core, strength) = (self.core as f32, self.strength as f32);
         let mut weights = [0.0; LANES];
         for i in 0..LANES {
-            let across = step.fma(i as f32, x);
-            let square = across.fma(across, y * y);
-            let fade = square.fma(-1.0 / Self::END as f32, 1.0);
+            let fade = squares[i].fma(-1.0 / Self::END as f32, 1.0);
             let fade = if fade > 0.0 { fade } else { 0.0 };
-            let from = square + core;
+            let from = squares[i] + core;
             weights[i] = strength * (fade * fade) / (from * from.sqrt());
         }
         weights
@@ -79,33 +78,51 @@ pub(super) fn project_lamp(lamp: &Lamp, view: &View) -> Option<Disc> {
             (position, (toward / full).max(STRAY_LIGHT))
         }
     };
-    let projection = view.camera.project(position)?;
-    let radius = lamp.radius * projection.pixels_per_meter;
+    let camera = &view.camera;
+    let depth = camera.depth(position);
+    if depth.is_nan() || depth < camera.near {
+        return None;
+    }
+    let to_lamp = position - camera.position;
+    let distance = to_lamp.length();
+    let angles = AngularDistance::new(camera, to_lamp / distance)?;
+    let seen_radius = math::asin((lamp.radius / distance).min(1.0));
     // A disc smaller than a pixel is drawn larger and dimmer.
-    let drawn_radius = radius.max(0.75);
-    let scale =
-        cone / (std::f64::consts::PI * lamp.radius * lamp.radius) * (radius / drawn_radius) * (radius / drawn_radius);
-    let distance = (position - view.camera.position).length_squared();
+    let min_radius = MIN_RADIUS_PIXELS / angles.min_pixels_per_radian();
+    let radius = seen_radius.max(min_radius);
+    let illuminance = lamp.light.intensity.map(|value| f64::from(value) * cone / (distance * distance));
+    let glare_rects = if has_glare(view) { angles.rects_within(GLARE_ANGLES[1], view.size) } else { Vec::new() };
     let disc = Disc {
-        center: projection.pixel,
-        radius: drawn_radius,
-        depth: projection.depth,
+        angles,
+        radius,
+        rects: angles.rects_within(radius, view.size),
+        glare_rects,
+        depth,
         radiance: [0.0; 3],
-        solid: radius >= 0.75,
-        illuminance: lamp.light.intensity.map(|value| (f64::from(value) * cone / distance) as f32),
+        solid: seen_radius >= min_radius,
+        illuminance: illuminance.map(|value| value as f32),
     };
-    let scale =
-        (1.0 - GLARE_FRACTION) * scale * std::f64::consts::PI * drawn_radius * drawn_radius / disc.pixels_covered();
-    Some(Disc { radiance: lamp.light.intensity.map(|value| (f64::from(value) * scale) as f32), ..disc })
+    // Luminance times solid angle, I / (pi r^2) 2 pi (1 - cos a) with sin a = r / d: the illuminance I / d^2 but for spheres right before the lens, whose
+    // edge shines obliquely on a surface that faces their center.
+    let whole = 2.0 / (1.0 + math::cos(seen_radius));
+    let scale = (1.0 - GLARE_FRACTION) * whole / disc.solid_angle_covered();
+    Some(Disc { radiance: illuminance.map(|value| (value * scale) as f32), ..disc })
 }
 
+/// Smallest radius of a disc in the picture, pixels.
+const MIN_RADIUS_PIXELS: f64 = 0.75;
+
 /// A lamp in the picture.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Disc {
-    /// Pixels.
-    pub(super) center: DVec2,
-    /// Pixels.
+    /// Angles of pixels from the direction of its center.
+    pub(super) angles: AngularDistance,
+    /// Angular radius with which it is drawn, radians.
     pub(super) radius: f64,
+    /// The parts of the picture that contain it.
+    pub(super) rects: Vec<Rect>,
+    /// The parts of the picture that its glare may reach.
+    pub(super) glare_rects: Vec<Rect>,
     /// m.
     pub(super) depth: f64,
     pub(super) radiance: [f32; 3],
@@ -116,39 +133,31 @@ pub(super) struct Disc {
 }
 
 impl Disc {
-    /// Fraction of the pixel in column `x` and row `y` that it covers.
-    pub(super) fn coverage(&self, x: f64, y: f64) -> f64 {
-        (self.radius + 0.5 - (DVec2::new(x, y) + 0.5 - self.center).length()).clamp(0.0, 1.0)
+    /// Fraction of the pixel with this center that it covers.
+    pub(super) fn coverage(&self, center: DVec2) -> f64 {
+        (self.angles.pixels_inside(chord(self.radius), center) + 0.5).clamp(0.0, 1.0)
     }
 
-    /// Sum of the coverage over all pixels; for a small disc it depends on its position between pixels.
-    pub(super) fn pixels_covered(&self) -> f64 {
-        if self.radius > 8.0 {
-            return std::f64::consts::PI * self.radius * self.radius;
+    /// Sum over all pixels of their coverage times their solid angle, steradian; for a small disc it depends on its position between pixels. Pixels beside
+    /// the picture count as well.
+    fn solid_angle_covered(&self) -> f64 {
+        /// From this radius on, pixels, the sum is that of the circle.
+        const RESOLVED_RADIUS: f64 = 8.0;
+        /// A small disc that is spread over more pixels is stretched by the edge of a wide lens, so that its position between pixels matters little.
+        /// This many take a fifth of a second. A fisheye of 360 degrees spreads a lamp behind the camera over all of its rim.
+        const MAX_PIXELS: u64 = 1 << 22;
+        let circle = std::f64::consts::PI * chord(self.radius) * chord(self.radius);
+        if self.radius * self.angles.min_pixels_per_radian() > RESOLVED_RADIUS {
+            return circle;
         }
-        let corner = (self.center - self.radius - 1.0).floor();
-        let side = (2.0 * self.radius).ceil() as i32 + 3;
-        let row = |y: i32| (0..side).map(move |x| self.coverage(corner.x + f64::from(x), corner.y + f64::from(y)));
-        (0..side).flat_map(row).sum()
-    }
-
-    pub(super) fn bounds(&self, view: &View) -> Rect {
-        self.square_bounds(self.radius + 1.0, view)
-    }
-
-    /// Pixels that its glare may reach.
-    pub(super) fn glare_bounds(&self, view: &View) -> Rect {
-        self.square_bounds(GLARE_ANGLES[1] * view.camera.focal_pixels, view)
-    }
-
-    /// The square of pixels around it.
-    pub(super) fn square_bounds(&self, reach: f64, view: &View) -> Rect {
-        let reach = DVec2::splat(reach);
-        let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-        let (low, high) = (self.center - reach, self.center + reach);
-        let (x, y) = (clamp(low.x.floor(), view.size[0]), clamp(low.y.floor(), view.size[1]));
-        let (right, bottom) = (clamp(high.x.ceil(), view.size[0]), clamp(high.y.ceil(), view.size[1]));
-        Rect { x, y, width: right - x, height: bottom - y }
+        let Some([columns, rows]) = self.angles.pixels_within(self.radius) else { return circle };
+        if columns.start.abs_diff(columns.end).saturating_mul(rows.start.abs_diff(rows.end)) > MAX_PIXELS {
+            return circle;
+        }
+        let centers = rows.flat_map(|y| columns.clone().map(move |x| DVec2::new(x as f64 + 0.5, y as f64 + 0.5)));
+        let covered: f64 =
+            centers.map(|center| self.coverage(center) * self.angles.camera().pixel_solid_angle(center)).sum();
+        if covered > 0.0 { covered } else { circle }
     }
 }
 
@@ -174,16 +183,15 @@ impl PreparedLamps<'_> {
         if has_glare(self.view) && slice.contains(0.0) { &self.discs } else { &[] }
     }
 
-    /// Adds the glare of a lamp where the plate does not hide the lamp.
+    /// Adds the glare of a lamp in `rect`, where the plate does not hide the lamp.
     #[inline(always)]
-    pub(super) fn add_glare(&self, disc: &Disc, strip: &mut Strip) {
-        let rect = disc.glare_bounds(self.view).intersection(&strip.rect);
-        let glare = Glare::new(disc.radius / self.view.camera.focal_pixels);
+    fn add_glare(disc: &Disc, rect: Rect, strip: &mut Strip) {
+        let glare = Glare::new(disc.radius);
         for y in rect.y..rect.bottom() {
             // Batches begin at multiples of sixteen in the whole picture, whatever the strip.
             let mut x = rect.x / LANES * LANES;
             while x < rect.right() {
-                let mut weights = glare.at_sixteen(self.offset(disc, x, y));
+                let mut weights = glare.at_sixteen(disc.angles.squares(x, y));
                 let inside = rect.x.max(x) - x..rect.right().min(x + LANES) - x;
                 let first = (y - strip.rect.y) * strip.rect.width + x + inside.start - strip.rect.x;
                 if strip.has_plate() {
@@ -206,37 +214,38 @@ impl PreparedLamps<'_> {
         }
     }
 
-    /// Angles from a lamp to the center of the pixel in column `x` and row `y` to the right and down, and between pixels, radians.
-    fn offset(&self, disc: &Disc, x: usize, y: usize) -> [f32; 3] {
-        let per_pixel = 1.0 / self.view.camera.focal_pixels;
-        let offset = (DVec2::new(x as f64, y as f64) + 0.5 - disc.center) * per_pixel;
-        [offset.x as f32, offset.y as f32, per_pixel as f32]
+    /// Adds the light of a disc in `rect` and hides what is behind it.
+    fn add_disc(disc: &Disc, rect: Rect, strip: &mut Strip) {
+        for (x, y) in (rect.y..rect.bottom()).flat_map(|y| (rect.x..rect.right()).map(move |x| (x, y))) {
+            let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+            let center = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+            let coverage = disc.coverage(center) as f32;
+            if coverage > 0.0 && disc.angles.camera().is_in_circle(center) && strip.visible(index, disc.depth as f32) {
+                let transmittance = if disc.solid { 1.0 - coverage } else { 1.0 };
+                let light = disc.radiance.map(|value| value * coverage);
+                strip.add_behind(index, light, [transmittance; 3], disc.depth as f32);
+            }
+        }
     }
 }
 
 impl Prepared for PreparedLamps<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
-        let discs = self.discs_in(slice).map(|disc| disc.bounds(self.view));
-        let glares = self.glare_sources(slice).iter().map(|disc| disc.glare_bounds(self.view));
-        discs.chain(glares).fold(Rect::default(), |all, rect| all.union(&rect))
+        let discs = self.discs_in(slice).flat_map(|disc| &disc.rects);
+        let glares = self.glare_sources(slice).iter().flat_map(|disc| &disc.glare_rects);
+        discs.chain(glares).fold(Rect::default(), |all, rect| all.union(rect))
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let drawn = strip.rect;
         for disc in self.glare_sources(slice) {
-            dispatch!(bansho_base::math::simd::level(), _simd => self.add_glare(disc, strip));
+            for rect in disc.glare_rects.iter().map(|rect| rect.intersection(&drawn)) {
+                dispatch!(bansho_base::math::simd::level(), _simd => Self::add_glare(disc, rect, strip));
+            }
         }
         for disc in self.discs_in(slice) {
-            let rect = disc.bounds(self.view).intersection(&strip.rect);
-            for y in rect.y..rect.bottom() {
-                for x in rect.x..rect.right() {
-                    let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
-                    let coverage = disc.coverage(x as f64, y as f64) as f32;
-                    if coverage > 0.0 && strip.visible(index, disc.depth as f32) {
-                        let transmittance = if disc.solid { 1.0 - coverage } else { 1.0 };
-                        let light = disc.radiance.map(|value| value * coverage);
-                        strip.add_behind(index, light, [transmittance; 3], disc.depth as f32);
-                    }
-                }
+            for rect in disc.rects.iter().map(|rect| rect.intersection(&drawn)) {
+                Self::add_disc(disc, rect, strip);
             }
         }
     }

@@ -27,13 +27,16 @@
 
 mod model;
 pub(crate) mod night;
+mod parameters;
 mod phenomenon;
 mod render;
 mod row_cache;
 mod skyline;
 mod stars;
+mod table;
 
 pub use model::SkyBackdrop;
+pub use parameters::{NightParameters, SkyParameters};
 
 #[cfg(test)]
 mod tests;

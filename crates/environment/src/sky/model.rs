@@ -6,10 +6,10 @@ use bansho_base::{
     camera::Camera,
     host::once::get_or_compute,
     phenomenon::strip::{DepthInterval, View},
-    world::sky::{Sky, SkyKind, SkyParameters},
+    world::sky::{Sky, SkyKind, SkyObserver},
 };
 
-use super::{night::NightSky, row_cache::SkyCache, skyline::Skyline, stars::Stars};
+use super::{SkyParameters, night::NightSky, row_cache::SkyCache, skyline::Skyline, stars::Stars};
 
 /// The sky of a scene, infinitely far and opaque, with hills in front of it; at night with stars.
 pub struct SkyBackdrop {
@@ -51,12 +51,15 @@ impl SkyBackdrop {
             cache.enable_row_cache();
             return Some(cache.clone());
         }
-        let star_images = self.stars().map(|stars| stars.star_images(view, night, self.parameters.night.stars));
+        let observer = SkyObserver::at(view.camera.position);
+        let night = &night.above(observer);
+        let star_images =
+            self.stars().map(|stars| stars.star_images(view, night, observer, self.parameters.night.stars));
         let cache = SkyCache {
             cameras: cameras.to_vec(),
             size: view.size,
             sky: *sky,
-            night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way)),
+            night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way, observer)),
             star_images: Arc::new(star_images.unwrap_or_default()),
             rows: None,
         };

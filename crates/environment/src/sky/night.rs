@@ -7,13 +7,13 @@ use bansho_base::{
         self, DVec3,
         simd::{FourLanes, LANES, Real},
     },
-    world::sky::{Night, Sky},
+    world::sky::{Night, Sky, SkyObserver},
 };
 use fearless_simd::prelude::*;
 
 use super::stars;
 
-/// Steps of elevation from the horizon to the zenith, uniform in the square root of its sine.
+/// Steps of elevation from the horizon to the zenith, uniform in the square root of the sine above that of the horizon.
 const ELEVATION_STEPS: usize = 512;
 /// Luminance of the Milky Way's center line, cd/m^2, its width in sines, and its color temperature, K.
 const MILKY_WAY_LUMINANCE: f64 = 1.6e-4;
@@ -25,6 +25,9 @@ pub(crate) struct NightSky {
     almucantars: Vec<Almucantar>,
     /// Radiance below the horizon.
     ground: [f32; 4],
+    /// Sine of the elevation of the horizon, and one over the range of sines above it.
+    horizon: f32,
+    per_range: f32,
     /// Unit vectors toward the sun (below the horizon) and to the galactic pole.
     sunward: [f32; 3],
     pole: [f32; 3],
@@ -46,19 +49,23 @@ fn with_zero([red, green, blue]: [f32; 3]) -> [f32; 4] {
 }
 
 impl NightSky {
-    pub(crate) fn new(sky: &Sky, night: &Night, milky_way: f64) -> Self {
+    /// The sky of an observer, with the night that is [above](Night::above) him.
+    pub(crate) fn new(sky: &Sky, night: &Night, milky_way: f64, observer: SkyObserver) -> Self {
         let color = color::black_body().radiance(MILKY_WAY_K);
         let scale = milky_way * MILKY_WAY_LUMINANCE / f64::from(color::luminance(color));
+        let horizon = observer.horizon_sine();
         let almucantar = |step: usize| {
             let root = step as f64 / ELEVATION_STEPS as f64;
-            let elevation = math::asin(root * root);
+            let elevation = math::asin((1.0 - horizon).mul_add(root * root, horizon));
             let dimmed = (scale * night.transmittance(elevation)) as f32;
-            let [even, glow, blue] = night.almucantar(elevation).terms().map(with_zero);
+            let [even, glow, blue] = night.almucantar_of(elevation, observer).terms().map(with_zero);
             Almucantar { even, glow, blue, milky_way: with_zero(color.map(|value| value * dimmed)) }
         };
         Self {
             almucantars: (0..=ELEVATION_STEPS).map(almucantar).collect(),
             ground: with_zero(sky.radiance(-DVec3::Y)),
+            horizon: horizon as f32,
+            per_range: (1.0 / (1.0 - horizon)) as f32,
             sunward: night.sunward().as_vec3().to_array(),
             pole: stars::galactic_pole().as_vec3().to_array(),
         }
@@ -70,7 +77,8 @@ impl NightSky {
         let [xs, ys, zs] = &directions.components;
         let (mut steps, mut toward, mut milky_way_weights) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
-            let sine = if ys[i] > 0.0 { ys[i] } else { 0.0 };
+            let above = (ys[i] - self.horizon) * self.per_range;
+            let sine = if above > 0.0 { above } else { 0.0 };
             steps[i] = sine.sqrt().fma(ELEVATION_STEPS as f32, 0.5);
             let level = xs[i].fma(xs[i], zs[i] * zs[i]);
             let turned = xs[i].fma(self.sunward[0], zs[i] * self.sunward[2]) / level.sqrt().max(1e-9);
@@ -83,7 +91,7 @@ impl NightSky {
         }
         let mut colors = [self.ground; LANES];
         for i in 0..LANES {
-            if ys[i] >= 0.0 {
+            if ys[i] >= self.horizon {
                 let almucantar = &self.almucantars[(steps[i] as usize).min(ELEVATION_STEPS)];
                 colors[i] = almucantar.radiance(simd, toward[i], milky_way_weights[i]);
             }

@@ -1,12 +1,11 @@
 //! The skyline of hills and trees: elevation by azimuth.
 
-use bansho_base::{
-    math::{
-        self, MulAdd,
-        random::{Key, Purpose},
-    },
-    world::sky::SkyParameters,
+use bansho_base::math::{
+    self, MulAdd,
+    random::{Key, Purpose},
 };
+
+use super::SkyParameters;
 
 /// Samples around the horizon, a power of two.
 const SAMPLES: usize = 1 << 15;

@@ -9,7 +9,7 @@ use bansho_base::{
         random::{Key, Purpose, direction, uniform},
     },
     phenomenon::strip::View,
-    world::sky::Night,
+    world::sky::{Night, SkyObserver},
 };
 
 /// Logarithm (base 10) of the number of stars in the whole sky that are brighter than magnitude -1, 0, 1 ... 9 (Allen's
@@ -76,12 +76,19 @@ impl Stars {
     }
 
     /// The images of visible stars, sorted by row. Where the camera turns during the exposure, each star draws a trail.
-    pub(super) fn star_images(&self, view: &View, night: &Night, brightness: f64) -> Vec<StarImage> {
+    pub(super) fn star_images(
+        &self,
+        view: &View,
+        night: &Night,
+        observer: SkyObserver,
+        brightness: f64,
+    ) -> Vec<StarImage> {
+        let horizon = observer.horizon_sine();
         let cameras = view.cameras_at_most(MAX_TRAIL_SAMPLES);
         let scale = brightness / psf_integral() / cameras.len() as f64;
         let mut star_images = Vec::new();
         for camera in &cameras {
-            let image = |star: &Star| image(star, camera, view.size, night, scale);
+            let image = |star: &Star| image(star, camera, view.size, night, horizon, scale);
             star_images.par_extend(
                 self.0.par_iter().filter_map(image).flat_map_iter(|image| wrapped_images(image, camera, view.size)),
             );
@@ -142,8 +149,15 @@ fn psf_integral() -> f64 {
     std::f64::consts::PI * PSF_CORE * PSF_CORE / (PSF_BETA - 1.0)
 }
 
-fn image(star: &Star, camera: &Camera, size: [usize; 2], night: &Night, brightness: f64) -> Option<StarImage> {
-    if star.direction.y < 0.0 {
+fn image(
+    star: &Star,
+    camera: &Camera,
+    size: [usize; 2],
+    night: &Night,
+    horizon: f64,
+    brightness: f64,
+) -> Option<StarImage> {
+    if star.direction.y < horizon {
         return None;
     }
     let pixel = camera.project(camera.position + star.direction * 1e9)?.pixel;
@@ -203,7 +217,9 @@ impl StarImage {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::{camera::CameraParameters, phenomenon::strip::Shutter, world::sky::SkyParameters};
+    use bansho_base::{camera::CameraParameters, phenomenon::strip::Shutter};
+
+    use crate::sky::SkyParameters;
 
     use super::*;
 
@@ -250,7 +266,7 @@ mod tests {
         let light = |x: f64| {
             let direction = view.camera.direction(DVec2::new(x, 20.0)).unwrap();
             let star = Star { direction, magnitude: 1.0, illuminance: 1.0, color: [1.0; 3] };
-            let image = image(&star, &view.camera, size, &night, 1.0).unwrap();
+            let image = image(&star, &view.camera, size, &night, 0.0, 1.0).unwrap();
             let all = wrapped_images(image, &view.camera, size).flat_map(|image| {
                 (0..size[1])
                     .flat_map(move |y| (0..size[0]).step_by(16).flat_map(move |x| image.psf_row(x, y)[..16].to_vec()))
@@ -281,7 +297,7 @@ mod tests {
                 illuminance: MAGNITUDE_0_LUX * math::pow(10.0, -0.4),
                 color: [1.0; 3],
             };
-            let image = image(&star, &view.camera, view.size, &night, 1.0 / psf_integral()).unwrap();
+            let image = image(&star, &view.camera, view.size, &night, 0.0, 1.0 / psf_integral()).unwrap();
             let mut lux = 0.0;
             for (x, y) in (0..64).flat_map(|x| (0..48).map(move |y| (x, y))) {
                 let solid = solid_angle(&view.camera, DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();

@@ -15,7 +15,7 @@ use bansho_base::{
         surroundings::Surroundings,
     },
     world::{
-        sky::{SkyKind, SkyParameters},
+        sky::SkyKind,
         wind::{Wind, WindParameters},
     },
 };

@@ -28,12 +28,17 @@
 mod bvh;
 mod intersect;
 mod model;
+mod obstacle;
+mod parameters;
 mod phenomenon;
 mod pose;
 mod shade;
+mod table;
 mod trace;
 
 pub use model::Solids;
+pub use obstacle::{Obstacle, ObstacleMesh};
+pub use parameters::{ObstacleParameters, ObstacleShape};
 
 #[cfg(test)]
 mod tests;

@@ -1,11 +1,8 @@
 //! The visible obstacles of a scene.
 
-use bansho_base::{
-    color::acescg_from_srgb,
-    world::obstacle::{Obstacle, ObstacleParameters, ObstacleShape},
-};
+use bansho_base::color::acescg_from_srgb;
 
-use super::bvh::TriangleBvh;
+use super::{Obstacle, ObstacleParameters, bvh::TriangleBvh};
 
 /// The visible obstacles of a scene.
 #[derive(Debug)]
@@ -47,18 +44,13 @@ impl Solids {
     /// The name of their layer.
     pub const NAME: &str = "obstacles";
 
-    /// Whether an obstacle is drawn.
-    pub fn draws(obstacle: &Obstacle) -> bool {
-        obstacle.parameters().visible && obstacle.parameters().shape != ObstacleShape::Plane
-    }
-
-    /// Those of some obstacles that are drawn.
+    /// Obstacles that are visible.
     pub fn new(obstacles: Vec<Obstacle>) -> Self {
         let solid = |obstacle: Obstacle| Solid {
             triangles: obstacle.mesh().map(|mesh| TriangleBvh::new(&mesh.mesh)),
             material: Material::new(obstacle.parameters()),
             obstacle,
         };
-        Self { solids: obstacles.into_iter().filter(Self::draws).map(solid).collect() }
+        Self { solids: obstacles.into_iter().map(solid).collect() }
     }
 }

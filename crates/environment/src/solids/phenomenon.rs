@@ -35,7 +35,7 @@ impl Run for Solids {
     /// The solids themselves belong to the scene, so all phenomena have them already.
     fn publish(&self, shutter: Shutter) -> Publication {
         let shadow_casters = self.solids.iter().map(|solid| solid.obstacle.at(shutter.middle())).collect();
-        Publication { shadow_casters, ..Publication::default() }
+        Publication { shadow_casters, shadow_motion: self.longest_path(shutter), ..Publication::default() }
     }
 
     fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {

@@ -1,26 +1,28 @@
 //! Camera and obstacles at one time while the shutter is open.
 
 use bansho_base::{
-    camera::Camera,
+    camera::{Camera, Lens, angular_distance::AngularDistance},
     geometry::transform::Transform,
-    math::{DVec2, DVec3},
-    phenomenon::strip::View,
-    world::obstacle::ObstacleShape,
+    math::{self, DVec2, DVec3},
+    phenomenon::strip::{Shutter, View},
 };
 
 use super::{
+    ObstacleShape,
     intersect::{self, Hit, Ray},
     model::{Solid, Solids},
 };
 
 /// Most time samples of an exposure.
-const MAX_TIME_SAMPLES: usize = 16;
+const MAX_TIME_SAMPLES: usize = 32;
 /// Motion in the picture from which on there is motion blur, pixels.
 const MIN_MOTION_PIXELS: f64 = 0.3;
 
 /// Camera and obstacles at one time.
 pub(super) struct Pose<'a> {
     pub(super) camera: Camera,
+    /// Fraction of the exposure that is over, if it is one of several poses.
+    pub(super) fraction: Option<f64>,
     solids: Vec<PlacedSolid<'a>>,
     /// Height of the mirror in which the scene is seen, if there is one: what is below it is not seen.
     mirror: Option<f64>,
@@ -50,12 +52,40 @@ pub(super) struct SurfacePoint<'a> {
 /// The poses of an exposure, evenly spaced in time: one if nothing moves in the picture. And which of the obstacles move.
 pub(super) fn poses<'a>(solids: &'a Solids, view: &View) -> (Vec<Pose<'a>>, Vec<bool>) {
     let at = |t: f64| Pose::new(solids, view, t);
-    let [open, close] = [view.shutter.open, view.shutter.close].map(at);
-    let moves: Vec<bool> = open.motion_pixels(&close).into_iter().map(|pixels| pixels >= MIN_MOTION_PIXELS).collect();
+    let [open, middle, close] = [view.shutter.open, view.shutter.middle(), view.shutter.close].map(at);
+    // An obstacle that turns around or shakes may end where it began.
+    let ways = [open.motion_pixels(&close), open.motion_pixels(&middle), middle.motion_pixels(&close)];
+    let moves: Vec<bool> = (0..solids.solids.len())
+        .map(|index| ways[0][index].max(ways[1][index] + ways[2][index]) >= MIN_MOTION_PIXELS)
+        .collect();
     if !moves.contains(&true) {
-        return (vec![at(view.shutter.middle())], moves);
+        return (vec![middle], moves);
     }
-    ((0..MAX_TIME_SAMPLES).map(|index| at(view.shutter.instant(index, MAX_TIME_SAMPLES))).collect(), moves)
+    let pose = |index: usize| Pose {
+        fraction: Some((index as f64 + 0.5) / MAX_TIME_SAMPLES as f64),
+        ..at(view.shutter.instant(index, MAX_TIME_SAMPLES))
+    };
+    ((0..MAX_TIME_SAMPLES).map(pose).collect(), moves)
+}
+
+impl Solids {
+    /// Length of the longest path of a corner of an obstacle while the shutter is open, m.
+    pub(super) fn longest_path(&self, shutter: Shutter) -> f64 {
+        if shutter.duration() <= 0.0 {
+            return 0.0;
+        }
+        let path = |solid: &Solid| {
+            let placements = shutter.path_times().map(|t| solid.obstacle.placement(t));
+            if placements.iter().all(|placement| *placement == placements[0]) {
+                return 0.0;
+            }
+            let corners = placements.map(|placement| solid.corners(&placement));
+            let of_corner =
+                |index: usize| corners.windows(2).map(|pair| (pair[1][index] - pair[0][index]).length()).sum::<f64>();
+            (0..8).map(of_corner).fold(0.0, f64::max)
+        };
+        self.solids.iter().map(path).fold(0.0, f64::max)
+    }
 }
 
 impl<'a> Pose<'a> {
@@ -65,7 +95,8 @@ impl<'a> Pose<'a> {
             let (center, radius) = bounds.unwrap_or((placement.position, f64::INFINITY));
             PlacedSolid { solid, placement, center, radius }
         };
-        Self { camera: view.camera_at(t), solids: solids.solids.iter().map(placed).collect(), mirror: view.mirror }
+        let solids = solids.solids.iter().map(placed).collect();
+        Self { camera: view.camera_at(t), fraction: None, solids, mirror: view.mirror }
     }
 
     /// Largest motion of each obstacle in the picture from this pose to another one, pixels.
@@ -74,8 +105,10 @@ impl<'a> Pose<'a> {
         let motion = |(before, after): (&PlacedSolid, &PlacedSolid)| {
             let ends = before.corners().into_iter().zip(after.corners());
             let each = ends.map(|(before, after)| {
-                let pair = self.camera.project(before).zip(other.camera.project(after));
-                pair.map_or(MIN_MOTION_PIXELS, |(a, b)| (a.pixel - b.pixel).length())
+                let pair = self.camera.project_beyond_circle(before).zip(other.camera.project_beyond_circle(after));
+                pair.map_or(MIN_MOTION_PIXELS, |(a, b)| {
+                    (a.pixel - other.camera.nearest_repetition(b.pixel, a.pixel)).length()
+                })
             });
             each.fold(0.0, f64::max)
         };
@@ -92,7 +125,8 @@ impl<'a> Pose<'a> {
         depths.filter(move |[_, far]| *far > near)
     }
 
-    /// Corners of the rectangle of the picture that each obstacle may cover, pixels; all of it if a part of the obstacle is beside or behind the camera.
+    /// Corners of the rectangle of the picture that each obstacle may cover, pixels; all of it if a part of the obstacle is beside or behind a perspective
+    /// camera. Through other lenses, where edges are curved, that of the sphere that contains it.
     pub(super) fn bounds(&self) -> Vec<[DVec2; 2]> {
         const ALL: [DVec2; 2] = [DVec2::NEG_INFINITY, DVec2::INFINITY];
         const NONE: [DVec2; 2] = [DVec2::INFINITY, DVec2::NEG_INFINITY];
@@ -101,6 +135,19 @@ impl<'a> Pose<'a> {
                 return NONE;
             }
             let mut bounds = NONE;
+            if self.camera.lens != Lens::Perspective {
+                let to_center = placed.center - self.camera.position;
+                let sine = placed.radius / to_center.length();
+                let direction = AngularDistance::new(&self.camera, to_center.normalize_or_zero());
+                let (Some(direction), true) = (direction, sine < 1.0) else { return ALL };
+                for rect in direction.rects_within(math::asin(sine), self.camera.size.map(|side| side.ceil() as usize))
+                {
+                    let corners = [[rect.x, rect.y], [rect.right(), rect.bottom()]];
+                    let [low, high] = corners.map(|corner| DVec2::from(corner.map(|side| side as f64)));
+                    bounds = [bounds[0].min(low), bounds[1].max(high)];
+                }
+                return bounds;
+            }
             for corner in placed.corners() {
                 let Some(projection) = self.camera.project(corner) else { return ALL };
                 bounds = [bounds[0].min(projection.pixel - 1.0), bounds[1].max(projection.pixel + 1.0)];
@@ -147,11 +194,11 @@ impl<'a> Pose<'a> {
     }
 }
 
-impl PlacedSolid<'_> {
-    /// Corners of its bounding box.
-    fn corners(&self) -> [DVec3; 8] {
-        let parameters = self.solid.obstacle.parameters();
-        let [low, high] = match (&self.solid.triangles, parameters.shape) {
+impl Solid {
+    /// Corners of its bounding box at a placement.
+    fn corners(&self, placement: &Transform) -> [DVec3; 8] {
+        let parameters = self.obstacle.parameters();
+        let [low, high] = match (&self.triangles, parameters.shape) {
             (Some(triangles), _) => triangles.bounds(),
             (None, shape) => {
                 let radius = parameters.radius;
@@ -165,8 +212,15 @@ impl PlacedSolid<'_> {
         };
         std::array::from_fn(|index| {
             let pick = |axis: usize| if index >> axis & 1 == 0 { low[axis] } else { high[axis] };
-            self.placement.point_in_world(DVec3::new(pick(0), pick(1), pick(2)))
+            placement.point_in_world(DVec3::new(pick(0), pick(1), pick(2)))
         })
+    }
+}
+
+impl PlacedSolid<'_> {
+    /// Corners of its bounding box.
+    fn corners(&self) -> [DVec3; 8] {
+        self.solid.corners(&self.placement)
     }
 
     fn intersect(&self, ray: &Ray, limits: [f64; 2]) -> Option<Hit> {

@@ -49,6 +49,11 @@ impl<'a> Shading<'a> {
         Self { surroundings, ground: surroundings.others.occluders.iter().filter_map(level).max_by(f64::total_cmp) }
     }
 
+    /// Whether lights move, so that what they light differs from pose to pose.
+    pub(super) fn lights_move(&self) -> bool {
+        !self.surroundings.light_parts.is_empty()
+    }
+
     /// Radiance of a surface toward the camera of a pose, ACEScg, cd/m^2.
     pub(super) fn radiance(&self, surface: &SurfacePoint, pose: &Pose) -> [f32; 3] {
         let viewer = (pose.camera.position - surface.point).normalize_or(surface.normal);
@@ -64,7 +69,8 @@ impl<'a> Shading<'a> {
     fn lights(&self, surface: &SurfacePoint, viewer: DVec3, pose: &Pose) -> [f64; 3] {
         let material = &surface.solid.material;
         let mut radiance = [0.0; 3];
-        for light in &self.surroundings.others.lights {
+        let all = &self.surroundings.others.lights;
+        for light in pose.fraction.map_or(all.as_slice(), |fraction| self.surroundings.lights_at(fraction)) {
             let (illuminance, toward, distance) = self.arriving(light, surface.point);
             let cos = surface.normal.dot(toward);
             if cos <= 0.0 || illuminance == [0.0; 3] {

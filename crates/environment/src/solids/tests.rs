@@ -11,18 +11,15 @@ use bansho_base::{
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter, Light, Surroundings},
     },
-    world::{
-        obstacle::{ObstacleParameters, ObstacleShape},
-        wind::{Wind, WindParameters},
-    },
+    world::wind::{Wind, WindParameters},
 };
 
-use super::Solids;
+use super::{Obstacle, ObstacleParameters, ObstacleShape, Solids};
 
 const SIZE: [usize; 2] = [64, 48];
 
 fn solids(all: &[ObstacleParameters]) -> Solids {
-    Solids::new(all.iter().map(|one| one.build(&MemoryAssets::default()).unwrap()).collect())
+    Solids::new(all.iter().map(|one| Obstacle::new(one, &MemoryAssets::default()).unwrap()).collect())
 }
 
 fn ball(position: [f64; 3], radius: f64) -> ObstacleParameters {

@@ -20,8 +20,9 @@ use super::{
     shade::Shading,
 };
 
-/// Rays of a pixel that shows an edge, or motion.
-const SAMPLES: usize = 16;
+/// Rays of a pixel that shows an edge, and of one that shows motion.
+const EDGE_SAMPLES: usize = 16;
+const MOTION_SAMPLES: usize = 32;
 /// Cosine of the angle between the normals at the corners of a pixel up to which it shows one smooth surface.
 const SMOOTH_COS: f64 = 0.97;
 
@@ -50,10 +51,10 @@ pub(super) struct PreparedSolids {
     surfaces: OpaqueSurfaces,
 }
 
-/// Position of ray `index` within its pixel (Hammersley).
-fn sample_offset(index: usize) -> DVec2 {
-    let reversed = (index as u8).reverse_bits() >> (8 - SAMPLES.ilog2());
-    DVec2::new(index as f64 + 0.5, f64::from(reversed) + 0.5) / SAMPLES as f64
+/// Position of ray `index` of `count`, a power of two, within its pixel (Hammersley).
+fn sample_offset(index: usize, count: usize) -> DVec2 {
+    let reversed = (index as u8).reverse_bits() >> (8 - count.ilog2());
+    DVec2::new(index as f64 + 0.5, f64::from(reversed) + 0.5) / count as f64
 }
 
 /// Depths that the obstacles fill during an exposure, overlapping ones merged.
@@ -192,12 +193,16 @@ impl Tracer<'_> {
             return Pixel::EMPTY;
         }
         let position = DVec2::new(x as f64, y as f64);
-        if is_in_any(self.moving, x, y) || corners.iter().any(|corner| !is_smooth(corners[0], *corner)) {
-            return self.supersampled(position);
+        if is_in_any(self.moving, x, y) {
+            // Evenly spaced in time: ray i is at the time 7 i modulo 32.
+            return self.supersampled::<MOTION_SAMPLES>(position, &[2, 6, 10, 14, 18, 22, 26, 30]);
+        }
+        if corners.iter().any(|corner| !is_smooth(corners[0], *corner)) {
+            return self.supersampled::<EDGE_SAMPLES>(position, &[0]);
         }
         let center = self.middle().seen(position + 0.5);
         if !is_smooth(corners[0], center.map(|surface| (surface.index, surface.normal))) {
-            return self.supersampled(position);
+            return self.supersampled::<EDGE_SAMPLES>(position, &[0]);
         }
         center.map_or(Pixel::EMPTY, |surface| self.covered(&surface, self.middle()))
     }
@@ -208,25 +213,27 @@ impl Tracer<'_> {
         Pixel { radiance: self.shading.radiance(surface, pose), coverage: 1.0, depth, opaque_depth: depth }
     }
 
-    /// A pixel by many rays, each at its own time. Where they all meet one smooth surface, it is shaded once.
-    fn supersampled(&self, position: DVec2) -> Pixel {
+    /// A pixel by many rays, each at its own time. Where they all meet one smooth surface, it is shaded where the rays `shaded` meet it.
+    fn supersampled<const N: usize>(&self, position: DVec2, shaded: &[usize]) -> Pixel {
         let sample = |index: usize| {
             // The times are in another order than the columns, so that motion does not shear an edge.
-            let pose = &self.poses[(index * 7 % SAMPLES) * self.poses.len() / SAMPLES];
-            pose.seen(position + sample_offset(index)).map(|surface| (surface, pose))
+            let pose = &self.poses[(index * 7 % N) * self.poses.len() / N];
+            pose.seen(position + sample_offset(index, N)).map(|surface| (surface, pose))
         };
-        let samples: [Option<(SurfacePoint, &Pose)>; SAMPLES] = std::array::from_fn(sample);
+        let samples: [Option<(SurfacePoint, &Pose)>; N] = std::array::from_fn(sample);
         let corner =
             |sample: &Option<(SurfacePoint, &Pose)>| sample.map(|(surface, _)| (surface.index, surface.normal));
-        let is_one = samples.iter().all(|sample| is_smooth(corner(&samples[0]), corner(sample)));
+        let is_one = samples.iter().all(|sample| is_smooth(corner(&samples[0]), corner(sample)))
+            && !(self.shading.lights_move() && self.poses.len() > 1);
         let hits = samples.iter().flatten().count();
         if hits == 0 {
             return Pixel::EMPTY;
         }
-        let mut pixel = Pixel { coverage: hits as f32 / SAMPLES as f32, opaque_depth: 0.0, ..Pixel::EMPTY };
+        let mut pixel = Pixel { coverage: hits as f32 / N as f32, opaque_depth: 0.0, ..Pixel::EMPTY };
         for (index, (surface, pose)) in samples.iter().flatten().enumerate() {
-            if !is_one || index == 0 {
-                let weight = if is_one { 1.0 } else { 1.0 / hits as f32 };
+            let shades = if is_one { shaded.contains(&index) } else { true };
+            if shades {
+                let weight = if is_one { 1.0 / shaded.len() as f32 } else { 1.0 / hits as f32 };
                 let radiance = self.shading.radiance(surface, pose);
                 (0..3).for_each(|c| pixel.radiance[c] += radiance[c] * weight);
             }

@@ -2,14 +2,14 @@
 
 use bansho_base::math::{self, DVec3};
 
-use bansho_fire::particles::{Particle, Particles};
+use bansho_fire::particles::{GasParticles, Particle};
 
 const LIFETIME_S: f64 = 1.1;
 const DENSITY: f64 = 0.2;
 
 /// `count` particles of a plume `height` m high at time `t`: they start on a disk, move inward as they accelerate, and sway as they rise.
-pub(crate) fn plume(count: usize, height: f64, t: f64) -> Particles {
-    let mut particles = Particles::new(DVec3::ZERO);
+pub(crate) fn plume(count: usize, height: f64, t: f64) -> GasParticles {
+    let mut particles = GasParticles::new(DVec3::ZERO);
     let rate = count as f64 / LIFETIME_S;
     let last = (t * rate).floor() as i64;
     // The volume of the plume is about a twentieth of its height cubed.

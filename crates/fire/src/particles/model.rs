@@ -4,14 +4,16 @@ use bansho_base::{
     host::{assets::Assets, constructions},
     math::{DVec2, DVec3, random::Key},
     parameters::{Auto, Parameter},
+    phenomenon::strip::Shutter,
 };
 
 use super::{
     error::{ParticleError, ParticleErrorKind},
     parameters::FlameParticlesParameters,
-    render::{BufferPool, FadeOut, Gas},
+    past_states::PastStates,
+    render::{BufferPool, FadeOut, Gas, GasExposure, GasState},
 };
-use crate::particles::simulate::{Simulation, burner::Burner, derived::DerivedConstants, particles::Particles};
+use crate::particles::simulate::{Simulation, burner::Burner, derived::DerivedConstants, particles::GasParticles};
 
 /// A particle flame at one time. As built it is at the beginning of the preroll. Runs are copies of it, which share the constants.
 #[derive(Clone, Debug)]
@@ -20,6 +22,8 @@ pub struct FlameParticles {
     pub(super) key: Key,
     pub(super) parameters: FlameParticlesParameters,
     pub(super) simulation: Simulation,
+    /// Earlier states from which a long exposure is drawn.
+    pub(super) past: PastStates,
     /// Time of the state, s.
     pub(super) time: f64,
     /// Temperature of the air at the last step, K.
@@ -51,6 +55,7 @@ impl FlameParticles {
             name: name.to_owned(),
             key,
             time: -steps * parameters.step_s,
+            past: PastStates::new(parameters.step_s, -steps * parameters.step_s),
             air_temperature_k: bansho_base::world::air::Air::default().temperature_k,
             simulation: Simulation::new(&parameters, constants, key),
             buffers: BufferPool::default(),
@@ -59,17 +64,28 @@ impl FlameParticles {
     }
 
     /// The particles of the current state.
-    pub fn particles(&self) -> &Particles {
+    pub fn particles(&self) -> &GasParticles {
         &self.simulation.particles
     }
 
-    /// The gas as the renderer sees it.
+    /// The gas of the current state as the renderer sees it.
     pub(super) fn gas(&self) -> Gas<'_> {
+        self.gas_of(&self.simulation.particles, self.time)
+    }
+
+    /// The gas of the last state that is not after `t`, as far as states are kept: also that of a part of the exposure to whose end it was stepped.
+    fn gas_at(&self, t: f64) -> Gas<'_> {
+        let earlier = self.past.state_at(t).filter(|_| !self.past.is_reached(self.time, t));
+        earlier.map_or_else(|| self.gas(), |state| self.gas_of(&state.particles, state.time))
+    }
+
+    /// The gas of a state as the renderer sees it.
+    fn gas_of<'a>(&'a self, particles: &'a GasParticles, time: f64) -> Gas<'a> {
         let tallest = self.tallest_burner();
-        let position = DVec3::from(self.parameters.position) + tallest.position(self.time);
+        let position = DVec3::from(self.parameters.position) + tallest.position(time);
         Gas {
-            particles: &self.simulation.particles,
-            time: self.time,
+            particles,
+            time,
             air_temperature_k: self.air_temperature_k,
             detail_speed: match self.parameters.rendering.detail_speed {
                 Auto::Set(speed) => speed,
@@ -81,6 +97,39 @@ impl FlameParticles {
             fade_out: self.fade_out(),
             buffers: &self.buffers,
         }
+    }
+
+    /// The states from which an exposure is drawn, each with its part of the exposure.
+    pub(super) fn states(&self, shutter: Shutter) -> Vec<GasState<'_>> {
+        let past = self.past.of_exposure(shutter).map(|state| self.gas_of(&state.particles, state.time));
+        let mut gases: Vec<Gas> = past.collect();
+        if self.past.is_exposed(self.time, shutter) {
+            gases.push(self.gas());
+        }
+        if gases.is_empty() {
+            gases.push(self.gas_at(shutter.middle()));
+        }
+        let begin = |index: usize| match gases.get(index) {
+            Some(gas) if index > 0 => gas.time.max(shutter.open),
+            Some(_) => shutter.open,
+            None => shutter.close,
+        };
+        let mut states = Vec::with_capacity(gases.len());
+        for (index, gas) in gases.iter().enumerate() {
+            let part = Shutter { open: begin(index), close: begin(index + 1) };
+            if part.close > part.open || gases.len() == 1 {
+                states.push(GasState { gas: *gas, shutter: part });
+            }
+        }
+        states
+    }
+
+    /// What an exposure sees of the gas.
+    pub(super) fn exposure(&self, shutter: Shutter) -> GasExposure<'_> {
+        let states = self.states(shutter);
+        let middle = states.iter().rev().find(|state| self.past.is_reached(state.gas.time, shutter.middle()));
+        let middle = middle.or(states.first()).map_or_else(|| self.gas(), |state| state.gas);
+        GasExposure { middle, states, is_short: self.past.is_short(shutter) }
     }
 
     pub(super) fn fade_out(&self) -> FadeOut {

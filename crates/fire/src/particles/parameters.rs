@@ -191,7 +191,7 @@ bansho_base::parameters! {
         /// Burning, heating, cooling, soot.
         combustion: CombustionParameters = CombustionParameters::default();
         /// Appearance.
-        rendering: RenderingParameters = RenderingParameters::default();
+        rendering: GasRenderingParameters = GasRenderingParameters::default();
         /// Minimum corner of the simulated domain relative to `position`, outside which gas is removed; `"auto"` leaves enough space for flame and smoke.
         domain_min: Auto<[f64; 3]> = Auto::Auto, unit("m");
         /// Maximum corner of the simulated domain relative to `position`.
@@ -228,7 +228,7 @@ bansho_base::choice! {
 
 bansho_base::parameters! {
     /// Rendering of the gas.
-    pub struct RenderingParameters {
+    pub struct GasRenderingParameters {
         /// How a particle is drawn: exact line integrals, the paper's sprites, or squares that show the density.
         sprite: SpriteStyle = SpriteStyle::LineIntegral;
         /// Factor of absorption and emission of soot; at 1 they follow from its volume fraction.

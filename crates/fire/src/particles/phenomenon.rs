@@ -10,11 +10,10 @@ use bansho_base::{
     parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
-        editor_hints::{DraftLimit, EditorHints, MeshImport, PositionHandles},
-        kind::{BuildContext, Describe},
         strip::{DepthInterval, Shutter, View},
         surroundings::{OtherPhenomena, Publication, Surroundings},
     },
+    tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
 use super::{
@@ -26,11 +25,14 @@ use super::{
     },
     render::{self, PreparedGas, SpriteStyle},
 };
-use crate::particles::simulate::{
-    burner::Burner,
-    derived::{DerivedConstants, check_particle_count},
-    particles::Particles,
-    snapshot,
+use crate::{
+    GAS_FLOW, POSITION,
+    particles::simulate::{
+        burner::Burner,
+        derived::{DerivedConstants, check_particle_count},
+        particles::GasParticles,
+        snapshot,
+    },
 };
 
 impl FlameParticlesParameters {
@@ -42,52 +44,57 @@ impl FlameParticlesParameters {
         }
         stated
     }
+
+    /// Moves the burners, so that the first is at `position`. Gas that burns already stays where it is.
+    fn move_burners(&mut self, position: DVec3) {
+        let last =
+            |burner: &BurnerParameters| burner.position.values().last().map_or(DVec3::ZERO, |last| DVec3::from(*last));
+        let first = self.burners.first().map_or(DVec3::ZERO, last);
+        let displacement = position - DVec3::from(self.position) - first;
+        for burner in &mut self.burners {
+            burner.position = (last(burner) + displacement).to_array().into();
+        }
+    }
 }
 
-impl Describe for FlameParticlesParameters {
-    const KEY: &'static str = "flame_particles";
-    const PLACEMENT_KEYS: &'static [&'static str] = &["position", "burners", "domain_min", "domain_max"];
-    const FIRST_KEYS: &'static [&'static str] = &[
-        "position",
-        "particles",
-        "forces.turbulence",
-        "combustion.soot_ppm",
-        "combustion.smoke_fraction",
-        "burners.diameter",
-        "burners.heat_release_kw",
-    ];
-    const EDITOR_HINTS: EditorHints = EditorHints {
-        draft_limits: &[DraftLimit { key: "particles", max: 4_000 }],
-        position_handles: Some(PositionHandles { key: "position", items: Some("burners") }),
-        mesh_import: Some(MeshImport { list: "burners", shape_key: "shape", shape: "mesh", file_key: "file" }),
-        ..EditorHints::NONE
-    };
-    const SCENE_DEFAULTS: &'static str = "\
+impl FlameParticlesParameters {
+    /// The table `[[flame_particles]]`.
+    pub const KIND: TableKind = TableKind {
+        placement_keys: &["position", "burners", "domain_min", "domain_max"],
+        first_keys: &[
+            "position",
+            "particles",
+            "forces.turbulence",
+            "combustion.soot_ppm",
+            "combustion.smoke_fraction",
+            "burners.diameter",
+            "burners.heat_release_kw",
+        ],
+        scene_defaults: "\
         camera = { position = [0.0, 0.9, 3.8], target = [0.0, 0.9, 0.0] }\n\
-        wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n";
+        wind = { velocity = [0.25, 0.0, 0.0], gust = 0.8 }\n",
+        ..TableKind::phenomenon::<Self>("flame_particles")
+    };
+}
+
+impl PhenomenonTable for FlameParticlesParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
 
     fn check_particle_budget(&self, others: i64) -> Result<i64, BuildError> {
         check_particle_count(self.particles, others).map_err(|error| BuildError::new(error.key, error.kind))?;
         Ok(self.particles + others)
     }
 
-    fn with_flow(&self, flow: f64) -> Option<Self> {
+    fn with_quantity(&self, quantity: &str, value: &[f64]) -> Option<Arc<dyn PhenomenonTable>> {
         let mut changed = self.with_stated_burners();
-        changed.burners.iter_mut().for_each(|burner| burner.flow = flow.into());
-        Some(changed)
-    }
-
-    /// Moves the burners, so that the first is at `position`. Gas that burns already stays where it is.
-    fn with_position(&self, position: [f64; 3]) -> Option<Self> {
-        let mut changed = self.with_stated_burners();
-        let last =
-            |burner: &BurnerParameters| burner.position.values().last().map_or(DVec3::ZERO, |last| DVec3::from(*last));
-        let first = changed.burners.first().map_or(DVec3::ZERO, last);
-        let displacement = DVec3::from(position) - DVec3::from(self.position) - first;
-        for burner in &mut changed.burners {
-            burner.position = (last(burner) + displacement).to_array().into();
+        match (quantity, value) {
+            (GAS_FLOW, &[flow]) => changed.burners.iter_mut().for_each(|burner| burner.flow = flow.into()),
+            (POSITION, &[x, y, z]) => changed.move_burners(DVec3::new(x, y, z)),
+            _ => return None,
         }
-        Some(changed)
+        Some(Arc::new(changed))
     }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
@@ -111,7 +118,7 @@ impl Phenomenon for FlameParticles {
 
     fn memory_bytes(&self, pixels: f64) -> f64 {
         // Measured: state and neighbor lists of each particle, and the grids of the picture.
-        480.0 * self.parameters.particles as f64 + 44.0 * pixels
+        1e6 + 560.0 * self.parameters.particles as f64 + 44.0 * pixels
     }
 
     fn luminance(&self) -> f64 {
@@ -183,12 +190,17 @@ fn table_without_effect(parameters: &FlameParticlesParameters) -> Option<&'stati
 
 impl Run for FlameParticles {
     fn publish(&self, shutter: Shutter) -> Publication {
-        let lights = render::point_lights_of_gas(&self.gas(), &self.parameters.rendering, shutter.middle());
+        let lights = render::point_lights_of_exposure(&self.exposure(shutter), &self.parameters.rendering, shutter);
         Publication { lights, ..Publication::default() }
     }
 
-    fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        render::depth_intervals(&self.gas(), &self.parameters.rendering, view)
+    fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
+        render::depth_intervals(
+            &self.exposure(view.shutter).middle,
+            &self.parameters.rendering,
+            view,
+            surroundings.wind,
+        )
     }
 
     fn prepare<'a>(
@@ -197,18 +209,18 @@ impl Run for FlameParticles {
         surroundings: &'a Surroundings<'a>,
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-        Ok(Box::new(PreparedGas::new(self.gas(), &self.parameters.rendering, view, surroundings, observer)?))
+        let (exposure, rendering) = (self.exposure(view.shutter), &self.parameters.rendering);
+        Ok(Box::new(PreparedGas::of_exposure(&exposure, rendering, view, surroundings, observer)?))
     }
 
     fn export(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
         let t = view.shutter.middle();
-        let gas = self.gas();
-        let Particles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
-        Some(PointCloud {
-            positions: (0..gas.particles.len()).map(|index| gas.position(index, t).as_vec3().to_array()).collect(),
-            velocities: u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect(),
-            quantities: [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())].into(),
-        })
+        let gas = self.exposure(view.shutter).middle;
+        let GasParticles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
+        let positions = (0..gas.particles.len()).map(|index| gas.position(index, t).to_array());
+        let velocities = u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect();
+        let quantities = [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())];
+        Some(PointCloud::new(view.export_origin, positions, velocities, quantities.into()))
     }
 
     fn as_stepped(&self) -> Option<&dyn Stepped> {
@@ -222,14 +234,29 @@ impl Run for FlameParticles {
 
 impl Stepped for FlameParticles {
     fn step(&mut self, time: f64, surroundings: &Surroundings) {
+        self.past.keep(self.time, &self.simulation.particles);
         self.simulation.step(time, surroundings);
         self.time = time + self.simulation.step_s();
         self.air_temperature_k = surroundings.air.temperature_k;
     }
 
+    fn time_for(&self, shutter: Shutter) -> f64 {
+        if self.past.has_several(shutter) { shutter.close } else { shutter.middle() }
+    }
+
+    fn begin_exposure(&mut self, shutter: Shutter) {
+        self.past.begin(shutter);
+    }
+
+    fn keeps_states_for(&self, shutter: Shutter) -> bool {
+        self.past.keeps(shutter, self.time)
+    }
+
     fn snapshot(&self) -> Vec<u8> {
         let head = [self.time, self.air_temperature_k].into_iter().flat_map(f64::to_le_bytes);
-        head.chain(snapshot::write(&self.simulation.particles)).collect()
+        let mut bytes: Vec<u8> = head.chain(snapshot::write(&self.simulation.particles)).collect();
+        self.past.write(&mut bytes);
+        bytes
     }
 
     fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
@@ -240,7 +267,10 @@ impl Stepped for FlameParticles {
             return Err(SnapshotError::Damaged);
         }
         let burners = self.simulation.constants.burners.len();
-        self.simulation.particles = snapshot::read(&self.simulation.particles, rest, burners)?;
+        let (state, past) = snapshot::split_first(rest)?;
+        let particles = snapshot::read(&self.simulation.particles, state, burners)?;
+        self.past.restore(self.past.read(past, &particles, burners)?);
+        self.simulation.particles = particles;
         (self.time, self.air_temperature_k) = (time, air);
         Ok(())
     }

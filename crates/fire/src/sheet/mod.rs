@@ -13,7 +13,7 @@
 //! | equation | what it says | function |
 //! |---|---|---|
 //! | (1) | `(p, q) = (u, w - s (t - t0))`: the texture scrolls upward | `animate::clock::Clock::scroll` |
-//! | (2) | `T0 = T(u, w - s (t - t0))`, in [0, 1]: value of the texture | `texture::Texture::sample` |
+//! | (2) | `T0 = T(u, w - s (t - t0))`, in [0, 1]: value of the texture | `texture::FlameTexture::sample` |
 //! | (4) | `L = 1 - (1 - V(w)) (1 - H(u))`: threshold | [`equations::threshold`] |
 //! | (5) | `T1 = max(0, T0 - L)`: excess over the threshold | [`equations::above_threshold`] |
 //! | (6) | `T2 = C(T1)`: sharpen | `tables::color_ramp::ColorRamp::new` |
@@ -41,7 +41,8 @@
 //! 5. `render::time_samples` gives the sheet's quad and state at each of them. `render::projection` maps pixels to sheet coordinates for any
 //!    lens; `tables::shape_tables` maps those to flame coordinates.
 //! 6. `render::shade` turns them into light and opacity; `render::smoke` prepares the second sheet, the smoke above the flame.
-//! 7. `render::draw` evaluates bands of rows and composites them into strips; `render::aovs` writes AOVs.
+//! 7. `render::draw` evaluates bands of rows and composites them into strips; `render::aovs` writes AOVs. Sheets that are small in the picture are shaded in
+//!    cells, whose light is averaged over pixels (`render::cells`).
 //! 8. Where the scene selects it, `soot_field` replaces 4 to 7: flame and smoke as one plume of soot that a fractal field displaces.
 //! 9. `render::prepared` sorts flames, smoke and [sparks](crate::sparks) by depth; `render::emitted_light` gives point lights for other objects.
 
@@ -56,8 +57,8 @@ mod tables;
 mod texture;
 pub use model::FlameSheet;
 pub use parameters::{
-    ColorParameters, Coloring, Facing, FlameSheetParameters, Instance, LightParameters, ShapeParameters, SheetMethod,
-    SmokeParameters, SootFieldParameters, Stage, TextureKind, TextureParameters,
+    ColorParameters, Coloring, Facing, FlameLightParameters, FlameSheetParameters, InstanceParameters, SheetMethod,
+    SheetShapeParameters, SheetStage, SmokeParameters, SootFieldParameters, TextureKind, TextureParameters,
 };
 pub use texture::{PaperTexture, paper_texture};
 

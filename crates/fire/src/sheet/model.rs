@@ -14,7 +14,7 @@ use super::{
         clock::Clock,
         warp::{FlameWaves, WarpState, WindLean},
     },
-    parameters::{ColorParameters, Facing, FlameSheetParameters, Instance, SheetMethod, TextureKind},
+    parameters::{ColorParameters, Facing, FlameSheetParameters, InstanceParameters, SheetMethod, TextureKind},
     soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
     texture::{FilterCache, FractalLayers, PaperLayer, PaperSum, TextureSource},
@@ -61,7 +61,7 @@ impl FlameSheet {
             parameters,
             clock,
             tables: OnceLock::new(),
-            filter_cache: FilterCache::default(),
+            filter_cache: FilterCache::new(flames.len()),
             flames,
         })
     }
@@ -136,7 +136,7 @@ pub(super) struct Tables {
 /// One instance of a flame: its placement, fluctuations and texture.
 #[derive(Clone, Debug)]
 pub(crate) struct FlameInstance {
-    pub(crate) placement: Instance,
+    pub(crate) placement: InstanceParameters,
     pub(crate) key: Key,
     pub(crate) waves: FlameWaves,
     pub(crate) texture_source: TextureSource,
@@ -146,6 +146,11 @@ impl FlameSheet {
     /// Center of a flame's base at `t`, m.
     pub(crate) fn base(&self, flame: &FlameInstance, t: f64) -> DVec3 {
         DVec3::from(self.parameters.position.at(self.clock.time(t))) + DVec3::from(flame.placement.position)
+    }
+
+    /// Motion of the flames' bases between two times, m; a jump by step keys is none.
+    pub(crate) fn base_displacement(&self, from: f64, to: f64) -> DVec3 {
+        DVec3::from(self.parameters.position.displacement(self.clock.time(from), self.clock.time(to)))
     }
 
     /// A flame's own time, with its phase.
@@ -208,9 +213,12 @@ fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Cloc
         .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
     let exact =
         (texture.kind == TextureKind::OhshimaItahashiExact).then(|| PaperSum::new(texture.octaves as u32, clock));
-    let placements =
-        if parameters.instances.is_empty() { vec![Instance::default()] } else { parameters.instances.clone() };
-    let flame = |(index, placement): (usize, Instance)| {
+    let placements = if parameters.instances.is_empty() {
+        vec![InstanceParameters::default()]
+    } else {
+        parameters.instances.clone()
+    };
+    let flame = |(index, placement): (usize, InstanceParameters)| {
         let key = instance_key(seed, name, parameters.variation, index);
         let texture_source = match (&paper, exact) {
             (Some(layer), _) => TextureSource::Paper(layer.clone()),

@@ -39,11 +39,11 @@ bansho_base::choice! {
 
 bansho_base::choice! {
     /// Stage of the computation that is shown. All stages but `flame` show the flat texture square (u, w), as the paper's pictures 1 to 4.
-    pub enum Stage {
+    pub enum SheetStage {
         /// The finished flame.
         Flame = "flame",
         /// The texture T0 (picture 1).
-        Texture = "texture",
+        FlameTexture = "texture",
         /// T1, after the threshold (picture 2).
         Thresholded = "thresholded",
         /// T2, after sharpening (picture 3).
@@ -57,7 +57,7 @@ bansho_base::choice! {
     /// How flame and smoke are computed.
     pub enum SheetMethod {
         /// A scrolling texture, thresholded, colored and mapped, eqs. (1) to (20); `smoke` adds a second sheet.
-        Texture = "texture",
+        FlameTexture = "texture",
         /// One field of soot temperature and density that a fractal field stirs, with the parameters `soot_field`: hot soot is flame, cool soot smoke (picture 9).
         SootField = "soot_field",
     }
@@ -75,7 +75,7 @@ bansho_base::choice! {
 
 bansho_base::parameters! {
     /// Outline of the flame and motion of its gas, eqs. (9) to (18).
-    pub struct ShapeParameters {
+    pub struct SheetShapeParameters {
         /// k, eq. (9): initial speed of the gas. At 0 it starts from rest and accelerates, at 1 its speed is constant.
         initial_speed: f64 = 0.7, limits(FRACTION);
         /// h, eq. (11): speed at the edge, where it is lowest, as a fraction of the speed on the axis.
@@ -215,7 +215,7 @@ bansho_base::parameters! {
 
 bansho_base::parameters! {
     /// Light of the flame on other objects. It follows the flame's emission over time.
-    pub struct LightParameters {
+    pub struct FlameLightParameters {
         /// Factor of that light; 0 for none.
         scale: f64 = 1.0, limits(Range::new(0.0, 1000.0));
         /// Number of point lights along the flame.
@@ -225,7 +225,7 @@ bansho_base::parameters! {
 
 bansho_base::parameters! {
     /// An instance of the flame.
-    pub struct Instance {
+    pub struct InstanceParameters {
         /// Position of its base relative to `position` of the flame.
         position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
         /// Size relative to `width` and `height` of the flame.
@@ -262,9 +262,9 @@ bansho_base::parameters! {
         /// Response to the wind: 0 for none, 1 for gas that drifts with the wind.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 10.0));
         /// How flame and smoke are computed. `"soot_field"` does not use `texture`, and of `shape` only `initial_speed`, sway and flicker.
-        method: SheetMethod = SheetMethod::Texture;
+        method: SheetMethod = SheetMethod::FlameTexture;
         /// Outline and motion.
-        shape: ShapeParameters = ShapeParameters::default();
+        shape: SheetShapeParameters = SheetShapeParameters::default();
         /// Texture, threshold and sharpening.
         texture: TextureParameters = TextureParameters::default();
         /// Color and soot.
@@ -276,12 +276,12 @@ bansho_base::parameters! {
         /// Flame and smoke as one field, for `method = "soot_field"`.
         soot_field: SootFieldParameters = SootFieldParameters::default();
         /// Light on other objects.
-        light: LightParameters = LightParameters::default();
+        light: FlameLightParameters = FlameLightParameters::default();
         /// Instances of the flame; an empty list is one instance at `position`.
-        instances: Vec<Instance> = Vec::new(), limits(Length { min: 0, max: 1000, item: () });
+        instances: Vec<InstanceParameters> = Vec::new(), limits(Length { min: 0, max: 1000, item: () });
         /// Number of time samples that are averaged over the exposure; `"auto"` depends on the scroll in pixels.
         time_samples: Auto<i64> = Auto::Auto, limits(Range::new(1.0, 64.0));
         /// Stage of the computation that is shown.
-        stage: Stage = Stage::Flame;
+        stage: SheetStage = SheetStage::Flame;
     }
 }

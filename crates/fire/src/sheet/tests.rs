@@ -78,8 +78,13 @@ fn rich() -> FlameSheetParameters {
         sparks: SparkParameters { rate: 60.0, ..SparkParameters::default() },
         smoke: SmokeParameters { optical_depth: 1.0, ..SmokeParameters::default() },
         instances: vec![
-            Instance::default(),
-            Instance { position: [0.4, 0.0, -0.6], scale: 0.7, phase_s: 1.0, ..Instance::default() },
+            InstanceParameters::default(),
+            InstanceParameters {
+                position: [0.4, 0.0, -0.6],
+                scale: 0.7,
+                phase_s: 1.0,
+                ..InstanceParameters::default()
+            },
         ],
         time_samples: Auto::Set(2),
         ..FlameSheetParameters::default()
@@ -285,8 +290,14 @@ fn curves_that_do_not_go_together_name_the_parameter() {
 fn red_in_bands(sheet: &FlameSheet, view: &View, rows: usize) -> Vec<f32> {
     with_wind([0.5, 0.0, 0.0], |surroundings| {
         let flame = &sheet.flames[0];
-        let (samples, _) =
-            sheet.samples(flame, &flame.texture_source.filtered(1e4, &sheet.filter_cache), view, surroundings.wind, 1);
+        let (samples, _) = sheet.samples(
+            flame,
+            &flame.texture_source.filtered(1e4, &sheet.filter_cache),
+            view,
+            surroundings.wind,
+            1,
+            None,
+        );
         let (shape, ramp) = (sheet.shape(), sheet.ramp());
         let context = DrawContext {
             shape,
@@ -349,6 +360,7 @@ fn red_of_campfire(finer: usize, minification: f32) -> Vec<f32> {
             &view,
             surroundings.wind,
             1,
+            None,
         );
         let (shape, ramp) = (sheet.shape(), sheet.ramp());
         let context = DrawContext {

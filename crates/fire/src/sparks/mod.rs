@@ -3,18 +3,17 @@
 mod streak;
 
 use bansho_base::{
-    camera::Camera,
     color,
     math::{
         self, DVec2, DVec3,
         random::{Key, Purpose},
     },
     parameters::{Range, animated::Animated},
-    phenomenon::strip::View,
+    phenomenon::strip::{DepthInterval, Shutter, View},
     world::wind::Wind,
 };
 
-pub(crate) use streak::Streak;
+pub(crate) use streak::SparkStreak;
 
 const FRACTION: Range = Range::new(0.0, 1.0);
 
@@ -80,7 +79,7 @@ pub(crate) struct SparkEmitter<'a> {
 
 impl SparkEmitter<'_> {
     /// Streaks of the sparks that are visible in the exposure.
-    pub(crate) fn streaks(&self, view: &View, wind: &Wind) -> Vec<Streak> {
+    pub(crate) fn streaks(&self, view: &View, wind: &Wind) -> Vec<SparkStreak> {
         let sparks = self.parameters;
         if sparks.rate <= 0.0 {
             return Vec::new();
@@ -92,26 +91,44 @@ impl SparkEmitter<'_> {
             }
             None => (sparks.rate, None),
         };
-        let (first, last) =
-            (((self.now - sparks.lifetime_s) * rate).floor() as i64 - 1, (self.now * rate).ceil() as i64);
+        // Those that start or go out while the shutter is open are seen for a part of the exposure.
+        let half = 0.5 * view.shutter.duration();
+        let (first, last) = (
+            ((self.now - half - sparks.lifetime_s) * rate).floor() as i64 - 1,
+            ((self.now + half) * rate).ceil() as i64,
+        );
         let loop_index = |id: i64| sparks_per_loop.map_or(id, |sparks_per_loop| id.rem_euclid(sparks_per_loop)) as u64;
-        (first..=last)
-            .filter_map(|id| {
-                let spark = self.spark(loop_index(id), self.now - id as f64 / rate, rate)?;
-                self.streak(&spark, view, wind)
-            })
-            .collect()
+        let mut streaks = Vec::new();
+        for id in first..=last {
+            if let Some(spark) = self.spark(loop_index(id), self.now - id as f64 / rate, rate, half) {
+                self.add_streaks_of(&spark, view, wind, &mut streaks);
+            }
+        }
+        streaks
     }
 
-    /// Spark `id`, if it glows `seconds_since_due` seconds after the time of its index; it starts after a random delay of up to one interval.
-    fn spark(&self, id: u64, seconds_since_due: f64, rate: f64) -> Option<Spark> {
+    /// The interval of depth of the sparks that are visible in the exposure; `None` without any.
+    pub(crate) fn depths(&self, view: &View, wind: &Wind) -> Option<DepthInterval> {
+        let depths = self.streaks(view, wind).into_iter().map(|streak| streak.depth);
+        let join = |all: DepthInterval, one: DepthInterval| DepthInterval {
+            near: all.near.min(one.near),
+            far: all.far.max(one.far),
+        };
+        depths.map(|depth| DepthInterval { near: depth, far: depth.next_up() }).reduce(join)
+    }
+
+    /// Spark `id`, if it glows at most `half_exposure_s` before or after the time that is `seconds_since_due` seconds after that of its index; it starts after
+    /// a random delay of up to one interval.
+    fn spark(&self, id: u64, seconds_since_due: f64, rate: f64, half_exposure_s: f64) -> Option<Spark> {
         let sparks = self.parameters;
         let first = self.key.uniforms(id, 0, Purpose::named("spark start")).map(f64::from);
         let second = self.key.uniforms(id, 0, Purpose::named("spark flight")).map(f64::from);
         let age = seconds_since_due - first[0] / rate;
         let lifetime_s = sparks.lifetime_s * (0.35 + 0.65 * first[1] * first[1]);
         let vary = |variate: f64| 1.0 + sparks.speed_variation * (2.0 * variate - 1.0);
-        let starts = (0.0..lifetime_s).contains(&age) && self.starts(id, self.now - age);
+        let glows =
+            (0.0..lifetime_s).contains(&age) || (age + half_exposure_s > 0.0 && age - half_exposure_s < lifetime_s);
+        let starts = glows && self.starts(id, self.now - age);
         starts.then(|| Spark {
             age,
             lifetime_s,
@@ -120,6 +137,13 @@ impl SparkEmitter<'_> {
             phases: [second[1], second[2]],
             turns: 0.6 + 1.2 * second[3],
         })
+    }
+
+    /// The part of an exposure in which a spark glows.
+    fn glow(&self, spark: &Spark, shutter: Shutter) -> Shutter {
+        let start = shutter.middle() - spark.age;
+        let (open, close) = (shutter.open.max(start), shutter.close.min(start + spark.lifetime_s));
+        Shutter { open, close: close.max(open) }
     }
 
     /// Whether spark `id` starts, which is due at time `t`.
@@ -161,22 +185,40 @@ impl SparkEmitter<'_> {
         mean * self.wind_response * (age + 0.33 * math::exp_m1(-age / 0.33))
     }
 
-    fn streak(&self, spark: &Spark, view: &View, wind: &Wind) -> Option<Streak> {
+    /// Appends the streaks that a spark draws: several where it crosses the seam of a panorama or the antipode of a fisheye.
+    fn add_streaks_of(&self, spark: &Spark, view: &View, wind: &Wind, streaks: &mut Vec<SparkStreak>) {
         let t = view.shutter.middle();
         let size = self.size;
         let origin = self.base + DVec3::new(spark.start.x * size.x, spark.start.y * size.y, spark.start.z * size.x);
-        let project_at = |at: f64, camera: &Camera| {
+        let project_at = |at: f64| {
+            let camera = view.camera_at(at);
             let age = (spark.age + at - t).clamp(0.0, spark.lifetime_s);
-            camera.project(origin + self.displacement(spark, age) + self.drift(wind, origin, at, age))
+            let position = origin + self.displacement(spark, age) + self.drift(wind, origin, at, age);
+            Some((camera.project_beyond_circle(position)?, (position - camera.position).length_squared()))
         };
-        let opened = project_at(view.shutter.open, &view.camera_at(view.shutter.open))?;
-        let closed = project_at(view.shutter.close, &view.camera_at(view.shutter.close))?;
-        let cooled_fraction = math::pow(spark.age / spark.lifetime_s, 0.8);
+        let glow = self.glow(spark, view.shutter);
+        let (Some((opened, opened_square)), Some((closed, closed_square))) =
+            (project_at(glow.open), project_at(glow.close))
+        else {
+            return;
+        };
+        let is_whole = glow == view.shutter;
+        let age = if is_whole { spark.age } else { (spark.age + glow.middle() - t).clamp(0.0, spark.lifetime_s) };
+        let share = if is_whole { 1.0 } else { glow.duration() / view.shutter.duration() };
+        let cooled_fraction = math::pow(age / spark.lifetime_s, 0.8);
         let hottest = self.parameters.temperature_k;
         let temperature = math::lerp(hottest, EXTINCTION_TEMPERATURE_K.min(hottest), cooled_fraction);
-        let radius = 0.5 * self.parameters.diameter * self.scale * opened.pixels_per_meter;
-        let area = std::f64::consts::PI * radius * radius;
-        let radiance = color::black_body().radiance(temperature as f32);
-        Streak::new(opened.pixel, closed.pixel, radius.max(0.6), radiance, area, 0.5 * (opened.depth + closed.depth))
+        let radius = 0.5 * self.parameters.diameter * self.scale;
+        // The mean solid angle of the sphere over the exposure.
+        let solid_angle = std::f64::consts::PI * radius * radius * 0.5 * (1.0 / opened_square + 1.0 / closed_square);
+        SparkStreak::images(
+            &view.camera,
+            [opened.pixel, closed.pixel],
+            radius * 0.5 * (opened.pixels_per_meter + closed.pixels_per_meter),
+            color::black_body().radiance(temperature as f32),
+            solid_angle * share,
+            0.5 * (opened.depth + closed.depth),
+            streaks,
+        );
     }
 }

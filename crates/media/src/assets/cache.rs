@@ -43,7 +43,7 @@ impl<T> Default for PictureCache<T> {
 
 impl<T: MemoryBytes> PictureCache<T> {
     pub(crate) fn get(&mut self, key: &PictureKey) -> Option<Arc<T>> {
-        let index = self.entries.iter().position(|(known, _)| known == key)?;
+        let index = self.entries.iter().position(|(cached, _)| cached == key)?;
         let entry = self.entries.remove(index);
         let picture = entry.1.clone();
         self.entries.push(entry);
@@ -52,7 +52,7 @@ impl<T: MemoryBytes> PictureCache<T> {
 
     /// Inserts `picture` and evicts the least recently used others beyond `budget` bytes.
     pub(crate) fn insert(&mut self, key: PictureKey, picture: Arc<T>, budget: usize) {
-        self.entries.retain(|(known, _)| *known != key);
+        self.entries.retain(|(cached, _)| *cached != key);
         self.entries.push((key, picture));
         let mut total = self.bytes();
         while total > budget && self.entries.len() > 1 {

@@ -4,7 +4,7 @@ use bansho_base::host::assets::AssetProblem;
 
 /// A format of pictures that is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PictureFormat {
+pub(crate) enum PlateFormat {
     Png,
     Jpeg,
     Exr,
@@ -79,8 +79,32 @@ const OTHERS: UnsupportedFormat = UnsupportedFormat {
 
 const UNSUPPORTED: [&UnsupportedFormat; 9] = [&HEIC, &AVIF, &RAW, &DPX, &PSD, &JXL, &JP2, &HDR, &OTHERS];
 
+/// First bytes of formats that are not read.
+const FIRST_BYTES: [(&[u8], &UnsupportedFormat); 16] = [
+    (b"8BPS", &PSD),
+    (b"SDPX", &DPX),
+    (b"XPDS", &DPX),
+    // Cineon.
+    (&[0x80, 0x2a, 0x5f, 0xd7], &DPX),
+    (b"FUJIFILMCCD-RAW", &RAW),
+    // Olympus and Panasonic; most other makers' raw files begin as a TIFF.
+    (b"IIRO", &RAW),
+    (b"IIU\0", &RAW),
+    // A bare codestream, and one in a container.
+    (&[0xff, 0x0a], &JXL),
+    (b"\0\0\0\x0cJXL ", &JXL),
+    (b"\0\0\0\x0cjP  ", &JP2),
+    (b"#?RADIANCE", &HDR),
+    (b"#?RGBE", &HDR),
+    (b"GIF8", &OTHERS),
+    (b"BM", &OTHERS),
+    (b"DDS ", &OTHERS),
+    (b"qoif", &OTHERS),
+];
+
 /// The format that is not read whose first bytes `file` has, whatever its name.
 fn by_first_bytes(file: &[u8]) -> Option<&'static UnsupportedFormat> {
+    // The box that begins files of ISO/IEC 14496-12; what is in them is told by the brand that follows.
     if let Some(brand) = file.get(4..12).and_then(|bytes| bytes.strip_prefix(b"ftyp")) {
         return match brand {
             b"avif" | b"avis" => Some(&AVIF),
@@ -89,38 +113,28 @@ fn by_first_bytes(file: &[u8]) -> Option<&'static UnsupportedFormat> {
             _ => None,
         };
     }
-    let begins = |start: &[u8]| file.starts_with(start);
-    match () {
-        () if begins(b"8BPS") => Some(&PSD),
-        () if begins(b"SDPX") || begins(b"XPDS") || begins(&[0x80, 0x2a, 0x5f, 0xd7]) => Some(&DPX),
-        () if begins(b"FUJIFILMCCD-RAW") || begins(b"IIRO") || begins(b"IIU\0") => Some(&RAW),
-        () if begins(&[0xff, 0x0a]) || begins(b"\0\0\0\x0cJXL ") => Some(&JXL),
-        () if begins(b"\0\0\0\x0cjP  ") => Some(&JP2),
-        () if begins(b"#?RADIANCE") || begins(b"#?RGBE") => Some(&HDR),
-        () if begins(b"GIF8") || begins(b"BM") || begins(b"DDS ") || begins(b"qoif") => Some(&OTHERS),
-        () => None,
-    }
+    FIRST_BYTES.iter().find(|(start, _)| file.starts_with(start)).map(|(_, format)| *format)
 }
 
 /// Refuses a file of a format that is known and not read, by its first bytes or its name.
 fn refuse_unsupported(file: &[u8], extension: &str) -> Result<(), AssetProblem> {
-    let by_name = || UNSUPPORTED.into_iter().find(|format| format.extensions.contains(&extension));
-    match by_first_bytes(file).or_else(by_name) {
+    let by_name = UNSUPPORTED.into_iter().find(|format| format.extensions.contains(&extension));
+    match by_first_bytes(file).or(by_name) {
         Some(UnsupportedFormat { format, advice, .. }) => Err(AssetProblem::UnsupportedFormat { format, advice }),
         None => Ok(()),
     }
 }
 
 /// The format of the picture `file`, whose name has this `extension`.
-pub(crate) fn picture_format(file: &[u8], extension: &str) -> Result<PictureFormat, AssetProblem> {
+pub(crate) fn picture_format(file: &[u8], extension: &str) -> Result<PlateFormat, AssetProblem> {
     let extension = extension.to_ascii_lowercase();
     refuse_unsupported(file, &extension)?;
     Ok(match extension.as_str() {
-        "png" => PictureFormat::Png,
-        "jpg" | "jpeg" | "jpe" | "jfif" => PictureFormat::Jpeg,
-        "exr" => PictureFormat::Exr,
-        "webp" => PictureFormat::WebP,
-        "tif" | "tiff" => PictureFormat::Tiff,
+        "png" => PlateFormat::Png,
+        "jpg" | "jpeg" | "jpe" | "jfif" => PlateFormat::Jpeg,
+        "exr" => PlateFormat::Exr,
+        "webp" => PlateFormat::WebP,
+        "tif" | "tiff" => PlateFormat::Tiff,
         _ => return Err(AssetProblem::UnknownKind),
     })
 }
@@ -157,6 +171,6 @@ mod tests {
         assert!(told(b"anything", "bmp").contains("convert it to PNG"));
         assert_eq!(picture_format(b"", "xyz"), Err(AssetProblem::UnknownKind));
         assert_eq!(depth_format(b"", "jpg"), Err(AssetProblem::UnknownDepthKind));
-        assert_eq!(picture_format(b"II*\0", "TIF"), Ok(PictureFormat::Tiff));
+        assert_eq!(picture_format(b"II*\0", "TIF"), Ok(PlateFormat::Tiff));
     }
 }

@@ -1,23 +1,11 @@
 //! Assets from files: plates, depth, meshes, drawings, text.
 
 mod cache;
-mod color;
-mod decoded;
-mod exif;
+mod completeness;
 mod formats;
-pub mod gltf;
-mod jpeg;
-pub mod limits;
-mod numpy;
-mod openexr;
-mod orientation;
-mod pfm;
-mod png;
-pub mod svg;
-mod tiff;
-mod webp;
 
 use std::{
+    cell::RefCell,
     collections::HashMap,
     fs,
     path::{Path, PathBuf},
@@ -31,15 +19,21 @@ use bansho_base::{
 
 use self::{
     cache::{PictureCache, PictureKey},
-    formats::{DepthFormat, PictureFormat},
+    formats::{DepthFormat, PlateFormat},
+};
+use crate::{
+    exr,
+    files::{
+        input::{self, InputError},
+        naming::{FrameTemplate, other_placeholder},
+    },
+    gltf::{decode_mesh, external_buffer_uris},
+    jpeg,
     limits::{MEMORY_BYTES, MemoryLimit, TEXT_BYTES},
+    numpy, pfm, png,
+    svg::decode_drawing,
+    tiff, webp,
 };
-use crate::files::{
-    input::{self, InputError},
-    naming::FrameTemplate,
-};
-use gltf::{decode_mesh, external_buffer_uris};
-use svg::decode_drawing;
 
 /// Largest size of the cache of pictures, and of that of depths, bytes. The last one is always kept.
 const CACHE_BYTES: usize = 512 << 20;
@@ -64,7 +58,7 @@ impl Default for InputLimits {
 /// number, unless it is a single one and a file has that very name. Files are cached, so a change of a file is only seen after [`FileAssets::clear_cache`].
 ///
 /// A file is rejected before memory is allocated if it is not a regular file, is outside [`InputLimits::root`], claims more than
-/// [`limits::SIDE`] pixels on a side or more than its bytes could contain, or would exceed [`InputLimits::memory_bytes`] together with the
+/// [`crate::limits::SIDE`] pixels on a side or more than its bytes could contain, or would exceed [`InputLimits::memory_bytes`] together with the
 /// files in use.
 #[derive(Debug)]
 pub struct FileAssets {
@@ -128,7 +122,16 @@ impl FileAssets {
             .map_err(|_| AssetError { path: path.to_owned(), problem: AssetProblem::FrameNumber })?;
         // An absolute path begins with an empty folder.
         let folder = if path.starts_with('/') && folder.is_empty() { "/" } else { folder };
-        Ok(self.folder.join(folder).join(template.name(frame)))
+        let folder = self.folder.join(folder);
+        let file = folder.join(template.name(frame));
+        if frame < 0 && !file.is_file() {
+            // As Bansho wrote negative numbers formerly.
+            let with_full_digits = folder.join(template.name_with_full_digits(frame));
+            if with_full_digits.is_file() {
+                return Ok(with_full_digits);
+            }
+        }
+        Ok(file)
     }
 
     fn lock_cache(&self) -> MutexGuard<'_, AssetCache> {
@@ -154,15 +157,17 @@ impl FileAssets {
     /// The path to open. With a root folder it is the canonical path, which must be inside the root.
     fn checked_path(&self, path: &Path) -> Result<PathBuf, AssetProblem> {
         let Some(root) = &self.limits.root else { return Ok(path.to_path_buf()) };
-        let outside = || AssetProblem::Outside { root: root.display().to_string() };
         let canonical_root = fs::canonicalize(root).map_err(|error| AssetProblem::Unreadable(error.to_string()))?;
         // For a missing file its nearest existing ancestor is checked, so that errors reveal nothing outside the root.
-        let found = path.ancestors().find_map(|ancestor| {
+        let nearest_existing = path.ancestors().find_map(|ancestor| {
             let ancestor = if ancestor.as_os_str().is_empty() { Path::new(".") } else { ancestor };
             fs::canonicalize(ancestor).ok()
         });
-        let found = found.filter(|found| found.starts_with(&canonical_root)).ok_or_else(outside)?;
-        Ok(fs::canonicalize(path).map_or_else(|_| path.to_path_buf(), |_| found))
+        let Some(checked) = nearest_existing.filter(|existing| existing.starts_with(&canonical_root)) else {
+            return Err(AssetProblem::Outside { root: root.display().to_string() });
+        };
+        // The canonical path is opened, since a link in the given one may be changed after the check.
+        Ok(fs::canonicalize(path).map_or_else(|_| path.to_path_buf(), |_| checked))
     }
 
     /// The bytes of a file of at most `limit` bytes.
@@ -170,15 +175,24 @@ impl FileAssets {
         Ok(input::read(&self.checked_path(path)?, limit)?)
     }
 
-    fn read_mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetProblem> {
+    fn read_mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
         if let Some(mesh) = self.lock_cache().meshes.get(path) {
             return Ok(mesh.clone());
         }
-        let read_resource = |uri: &str, limit: u64| self.read(&beside(path, uri), limit);
+        // The buffer that could not be read, which an error is about.
+        let unread = RefCell::new(None);
+        let read_resource = |uri: &str, limit: u64| {
+            let buffer = beside(path, uri);
+            let read = self.read(&buffer, limit);
+            *unread.borrow_mut() = read.is_err().then_some(buffer);
+            read
+        };
         let mesh = self.within_limit(|limit| {
+            unread.take();
             let file = self.read(path, limit.available())?;
             decode_mesh(&file, extension(path), &read_resource, limit)
         });
+        let mesh = mesh.map_err(|problem| error(unread.take().as_deref().unwrap_or(path), problem));
         let mesh = Arc::new(mesh?);
         self.lock_cache().meshes.insert(path.to_path_buf(), mesh.clone());
         Ok(mesh)
@@ -222,16 +236,16 @@ impl FileAssets {
     }
 
     /// A digest of a file and of its external buffers.
-    fn hash(&self, path: &Path) -> Result<[u8; 32], AssetProblem> {
-        let own = self.hash_file(path)?;
+    fn hash(&self, path: &Path) -> Result<[u8; 32], AssetError> {
+        let file_digest = self.hash_file(path).map_err(|problem| numbered_error(path, problem))?;
         let buffers = self.external_buffers(path);
         if buffers.is_empty() {
-            return Ok(own);
+            return Ok(file_digest);
         }
         let mut hasher = blake3::Hasher::new();
-        hasher.update(&own);
+        hasher.update(&file_digest);
         for path in buffers {
-            hasher.update(&self.hash_file(&path)?);
+            hasher.update(&self.hash_file(&path).map_err(|problem| error(&path, problem))?);
         }
         Ok(*hasher.finalize().as_bytes())
     }
@@ -261,12 +275,13 @@ fn percent_decoded(uri: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let Some((&byte, after)) = rest.split_first() {
-        let digit = |index: usize| after.get(index).and_then(|digit| char::from(*digit).to_digit(16));
-        match (byte, digit(0), digit(1)) {
-            (b'%', Some(high), Some(low)) => {
+        let digits = after.first_chunk().map(|pair: &[u8; 2]| pair.map(|digit| char::from(digit).to_digit(16)));
+        match (byte, digits) {
+            (b'%', Some([Some(high), Some(low)])) => {
                 bytes.push((16 * high + low) as u8);
                 rest = &after[2..];
             }
+            // A sign without two digits stands for itself.
             _ => {
                 bytes.push(byte);
                 rest = after;
@@ -284,7 +299,7 @@ fn extension(path: &Path) -> &str {
 /// an EXR.
 ///
 /// # Errors
-/// Another format, a size beyond the [`limits`] or beyond `limit`, no such layer, or damage. Never panics, and never allocates memory that the
+/// Another format, a size beyond the [`limits`](crate::limits) or beyond `limit`, no such layer, or damage. Never panics, and never allocates memory that the
 /// bytes could not fill.
 pub fn decode_picture(
     bytes: &[u8],
@@ -293,11 +308,11 @@ pub fn decode_picture(
     limit: MemoryLimit,
 ) -> Result<Picture, AssetProblem> {
     match formats::picture_format(bytes, extension)? {
-        PictureFormat::Png => png::decode(bytes, limit),
-        PictureFormat::Jpeg => jpeg::decode(bytes, limit),
-        PictureFormat::Exr => openexr::decode(bytes, layers, limit),
-        PictureFormat::WebP => webp::decode(bytes, limit),
-        PictureFormat::Tiff => tiff::decode(bytes, limit),
+        PlateFormat::Png => png::decode::decode(bytes, limit),
+        PlateFormat::Jpeg => jpeg::decode(bytes, limit),
+        PlateFormat::Exr => exr::decode::decode(bytes, layers, limit),
+        PlateFormat::WebP => webp::decode(bytes, limit),
+        PlateFormat::Tiff => tiff::decode(bytes, limit),
     }
 }
 
@@ -312,8 +327,8 @@ pub fn decode_depth(
     limit: MemoryLimit,
 ) -> Result<DepthMap, AssetProblem> {
     match formats::depth_format(bytes, extension)? {
-        DepthFormat::Exr => openexr::decode_depth(bytes, layer, limit),
-        DepthFormat::Png => png::depth(bytes, limit),
+        DepthFormat::Exr => exr::decode::decode_depth(bytes, layer, limit),
+        DepthFormat::Png => png::decode::depth(bytes, limit),
         DepthFormat::Pfm => pfm::depth(bytes, limit),
         DepthFormat::Npy => numpy::depth(bytes, limit),
         DepthFormat::Tiff => tiff::depth(bytes, limit),
@@ -334,7 +349,7 @@ impl Assets for FileAssets {
             let file = self.read(&key.path, limit.available())?;
             decode_picture(&file, extension(&key.path), layers, limit)
         });
-        let picture = Arc::new(picture.map_err(|problem| error(&key.path, problem))?);
+        let picture = Arc::new(picture.map_err(|problem| numbered_error(&key.path, problem))?);
         self.lock_cache().pictures.insert(key, picture.clone(), CACHE_BYTES);
         Ok(picture)
     }
@@ -349,14 +364,14 @@ impl Assets for FileAssets {
             let file = self.read(&key.path, limit.available())?;
             decode_depth(&file, extension(&key.path), layer, limit)
         });
-        let depth = Arc::new(depth.map_err(|problem| error(&key.path, problem))?);
+        let depth = Arc::new(depth.map_err(|problem| numbered_error(&key.path, problem))?);
         self.lock_cache().depths.insert(key, depth.clone(), DEPTH_CACHE_BYTES);
         Ok(depth)
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
         let path = self.folder.join(path);
-        self.read_mesh(&path).map_err(|problem| error(&path, problem))
+        self.read_mesh(&path)
     }
 
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
@@ -371,8 +386,17 @@ impl Assets for FileAssets {
 
     fn find(&self, path: &str, frame: i64) -> Result<(), AssetError> {
         let path = self.resolve(path, frame)?;
-        let found = self.checked_path(&path).and_then(|path| Ok(input::find(&path)?));
-        found.map_err(|problem| error(&path, problem))
+        let checked = self.checked_path(&path).and_then(|path| Ok(input::find(&path)?));
+        checked.map_err(|problem| numbered_error(&path, problem))
+    }
+
+    fn check_whole(&self, path: &str, frame: i64) -> Result<Option<[usize; 2]>, AssetError> {
+        let resolved = self.resolve(path, frame)?;
+        let checked = self.checked_path(&resolved).and_then(|path| {
+            let (mut file, length) = input::open(&path, self.limits.memory_bytes)?;
+            completeness::check(&mut file, length, extension(&path))
+        });
+        checked.map_err(|problem| numbered_error(&resolved, problem))
     }
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
@@ -380,9 +404,20 @@ impl Assets for FileAssets {
         if let Some(digest) = self.lock_cache().digests.get(&path) {
             return Ok(*digest);
         }
-        let digest = self.hash(&path).map_err(|problem| error(&path, problem))?;
+        let digest = self.hash(&path)?;
         self.lock_cache().digests.insert(path, digest);
         Ok(digest)
+    }
+}
+
+/// The error of a picture, of which a sequence may be meant in another program's way.
+fn numbered_error(path: &Path, problem: AssetProblem) -> AssetError {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    match (problem, other_placeholder(name)) {
+        (AssetProblem::Missing, Some((placeholder, digits))) => {
+            error(path, AssetProblem::OtherPlaceholder { placeholder: placeholder.to_owned(), own: "#".repeat(digits) })
+        }
+        (problem, _) => error(path, problem),
     }
 }
 

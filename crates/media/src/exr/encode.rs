@@ -1,9 +1,6 @@
-//! Frames to OpenEXR bytes: one part, lines in increasing order, ZIP in blocks of 16 lines.
-//!
-//! The header is written here rather than by the `exr` crate, which keeps custom attributes in a hash map and so writes
-//! them in another order every time. Bansho writes the same bytes for the same frame. The compression is by the crate.
+//! Frames to OpenEXR bytes: one part, lines in increasing order, ZIP in blocks of 16 lines, compressed by the `exr` crate.
 
-use std::path::Path;
+use std::{borrow::Cow, ops::Range, path::Path};
 
 use ::exr::{
     compression::Compression,
@@ -16,14 +13,12 @@ use ::exr::{
 };
 use bansho_base::frame::{Frame, Precision};
 
-use super::{
-    attribute::{self, Header, Window},
-    plane::{ChannelPlane, RowBuffer, planes},
-};
+use super::header::{self, ChannelDeclaration, EncodedHeader, FileColors, Window};
 use crate::{
     error::{MediaError, SizeRule},
     fingerprint,
 };
+use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
 
 /// Lines in a compressed block.
@@ -40,11 +35,28 @@ const SIDE_LIMIT: usize = 1 << 20;
 /// A size that the format does not allow, channels of another length than the picture, names that are empty, too long or duplicate. `path` is only
 /// used in errors.
 pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
+    encode_with(frame, FileColors::Acescg, path)
+}
+
+/// As [`encode`], of a file whose red, green and blue are no colors, such as motion or opacity: it has no chromaticities, and its `colorInteropID` is
+/// `data`.
+///
+/// # Errors
+/// As [`encode`].
+pub fn encode_data(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
+    encode_with(frame, FileColors::Data, path)
+}
+
+fn encode_with(frame: &Frame, colors: FileColors, path: &Path) -> Result<Vec<u8>, MediaError> {
     let planes = planes(frame);
     check_planes(frame, &planes, path)?;
     let (data, display) = windows(frame, path)?;
     let blocks = compressed_blocks(frame, &planes, path)?;
-    let Header { bytes: mut file, digest_at } = attribute::header(&frame.header, &planes, data, display);
+    let channels: Vec<ChannelDeclaration> =
+        planes.iter().map(|plane| ChannelDeclaration { name: &plane.name, precision: plane.precision }).collect();
+    let EncodedHeader { bytes: mut file, digest_at } =
+        header::encode_header(&frame.header, colors, &channels, data, display);
+    // The header, a table of the positions of all blocks, then the blocks, each with its first line and its length.
     let mut offset = file.len() + 8 * blocks.len();
     file.reserve(8 * blocks.len() + blocks.iter().map(|block| block.len() + 8).sum::<usize>());
     for block in &blocks {
@@ -57,6 +69,7 @@ pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
         file.extend((block.len() as u32).to_le_bytes());
         file.extend_from_slice(block);
     }
+    // Of the file with zeros in place of the digits.
     let digest = fingerprint::to_hex(blake3::hash(&file).as_bytes());
     file[digest_at..digest_at + 64].copy_from_slice(digest.as_bytes());
     Ok(file)
@@ -66,6 +79,7 @@ fn check_planes(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) -> Resu
     let expected = frame.beauty.width() * frame.beauty.height();
     for (index, plane) in planes.iter().enumerate() {
         let name = &*plane.name;
+        // The planes are sorted by name.
         let is_duplicate = index > 0 && planes[index - 1].name == name;
         if name.split('.').any(str::is_empty) || name.len() > 255 || name.contains('\0') || is_duplicate {
             return Err(MediaError::ChannelName { path: path.to_path_buf(), name: name.to_owned() });
@@ -104,37 +118,133 @@ fn compressed_blocks(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) ->
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let header = crate_header(planes, width, height);
     let bytes_per_line = width * planes.iter().map(ChannelPlane::bytes_per_value).sum::<usize>();
-    let block = |index: usize| {
-        let lines = index * LINES_PER_BLOCK..((index + 1) * LINES_PER_BLOCK).min(height);
-        let (mut bytes, mut row) = (Vec::with_capacity(bytes_per_line * lines.len()), RowBuffer::default());
-        for line in lines.clone() {
-            planes.iter().for_each(|plane| plane.append(line * width..(line + 1) * width, &mut row, &mut bytes));
-        }
-        let section = IntegerBounds::new(Vec2(0, lines.start as i32), Vec2(width, lines.len()));
-        header.compression.compress_image_section_to_le(&header, bytes, section)
-    };
     (0..height.div_ceil(LINES_PER_BLOCK))
         .into_par_iter()
-        .map(block)
+        .map(|index| {
+            let lines = index * LINES_PER_BLOCK..((index + 1) * LINES_PER_BLOCK).min(height);
+            let (mut bytes, mut row) = (Vec::with_capacity(bytes_per_line * lines.len()), PlaneRow::default());
+            // Line by line, and in each all values of a channel together.
+            for line in lines.clone() {
+                planes.iter().for_each(|plane| plane.append(line * width..(line + 1) * width, &mut row, &mut bytes));
+            }
+            let section = IntegerBounds::new(Vec2(0, lines.start as i32), Vec2(width, lines.len()));
+            header.compression.compress_image_section_to_le(&header, bytes, section)
+        })
         .collect::<Result<_, _>>()
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
 /// The header that the crate needs to compress a block.
 fn crate_header(planes: &[ChannelPlane<'_>], width: usize, height: usize) -> CrateHeader {
-    let channel = |plane: &ChannelPlane<'_>| {
-        let kind = match plane.precision {
-            Precision::Half => SampleType::F16,
-            Precision::Single => SampleType::F32,
-        };
-        // The crate uses only the type. A dummy name avoids its checks of names.
-        ChannelDescription::new(Text::new_or_none("c").unwrap_or_default(), kind, false)
-    };
-    CrateHeader::new(Text::default(), (width, height), planes.iter().map(channel).collect()).with_encoding(
+    let kinds = planes.iter().map(|plane| match plane.precision {
+        Precision::Half => SampleType::F16,
+        Precision::Single => SampleType::F32,
+    });
+    // The crate uses only the type. A dummy name avoids its checks of names.
+    let channels = kinds.map(|kind| ChannelDescription::new(Text::new_or_none("c").unwrap_or_default(), kind, false));
+    CrateHeader::new(Text::default(), (width, height), channels.collect()).with_encoding(
         Compression::ZIP16,
         BlockDescription::ScanLines,
         LineOrder::Increasing,
     )
+}
+
+/// Largest finite half, to which brighter pixels are clamped: infinities and NaN spread in every filter.
+const HALF_MAX: f32 = 65504.0;
+
+/// Component names that readers recognize. Blender ignores channels with other suffixes.
+const COMPONENTS: [&str; 10] = ["R", "G", "B", "A", "X", "Y", "Z", "U", "V", "W"];
+
+/// One channel of the file.
+struct ChannelPlane<'a> {
+    name: Cow<'a, str>,
+    precision: Precision,
+    source: ChannelSource<'a>,
+}
+
+enum ChannelSource<'a> {
+    /// Component 0 to 3 of the color.
+    Beauty(&'a [[f32; 4]], usize),
+    Values(&'a [f32]),
+}
+
+/// All channels of `frame`, sorted by name as the format requires.
+fn planes(frame: &Frame) -> Vec<ChannelPlane<'_>> {
+    let beauty = ["R", "G", "B", "A"].into_iter().enumerate().map(|(component, name)| ChannelPlane {
+        name: name.into(),
+        precision: Precision::Half,
+        source: ChannelSource::Beauty(frame.beauty.pixels(), component),
+    });
+    let depth = frame.depth.iter().map(|values| ChannelPlane {
+        name: "Z".into(),
+        precision: Precision::Single,
+        source: ChannelSource::Values(values),
+    });
+    let channels = frame.channels.iter().map(|channel| ChannelPlane {
+        name: exr_channel_name(&channel.name),
+        precision: channel.precision,
+        source: ChannelSource::Values(&channel.values),
+    });
+    let mut planes: Vec<_> = beauty.chain(depth).chain(channels).collect();
+    planes.sort_by(|a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
+    planes
+}
+
+/// Channel name in the file. A scalar quantity such as `torch.temperature_k` becomes the single component `V` of a layer.
+fn exr_channel_name(name: &str) -> Cow<'_, str> {
+    let is_component = name.rsplit('.').next().is_some_and(|last| COMPONENTS.contains(&last));
+    if is_component { name.into() } else { format!("{name}.V").into() }
+}
+
+impl ChannelPlane<'_> {
+    /// Number of values.
+    fn len(&self) -> usize {
+        match self.source {
+            ChannelSource::Beauty(pixels, _) => pixels.len(),
+            ChannelSource::Values(values) => values.len(),
+        }
+    }
+
+    /// Bytes of a value in the file.
+    fn bytes_per_value(&self) -> usize {
+        match self.precision {
+            Precision::Half => 2,
+            Precision::Single => 4,
+        }
+    }
+
+    /// Appends the values of the pixels `range`, in native byte order.
+    fn append(&self, range: Range<usize>, row: &mut PlaneRow, bytes: &mut Vec<u8>) {
+        row.floats.clear();
+        match self.source {
+            ChannelSource::Beauty(pixels, component) => {
+                row.floats.extend(pixels[range].iter().map(|pixel| pixel[component]));
+            }
+            ChannelSource::Values(values) => row.floats.extend_from_slice(&values[range]),
+        }
+        match self.precision {
+            Precision::Single => bytes.extend_from_slice(bytemuck::cast_slice(&row.floats)),
+            Precision::Half => {
+                row.floats.iter_mut().for_each(|value| *value = finite_half(*value));
+                row.halves.resize(row.floats.len(), half::f16::ZERO);
+                row.halves.convert_from_f32_slice(&row.floats);
+                bytes.extend(row.halves.iter().flat_map(|half| half.to_ne_bytes()));
+            }
+        }
+    }
+}
+
+/// A finite color within the range of half.
+#[inline(always)]
+fn finite_half(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(-HALF_MAX, HALF_MAX) }
+}
+
+/// Buffer for the conversion of a row.
+#[derive(Default)]
+struct PlaneRow {
+    floats: Vec<f32>,
+    halves: Vec<half::f16>,
 }
 
 #[cfg(test)]
@@ -219,6 +329,21 @@ mod tests {
         (camera.lens, camera.fisheye_fov_deg) = (Some(Lens::Fisheye), Some(200.0));
         assert!(!contains(&frame, "worldToNDC") && !contains(&frame, "verticalFovDeg"));
         assert!(contains(&frame, "bansho:lens") && contains(&frame, "bansho:fisheyeFovDeg"));
+    }
+
+    #[test]
+    fn data_do_not_claim_to_be_colors() {
+        let frame = testing::frame(8, 8);
+        let [color, data] = [encode, encode_data].map(|encode| encode(&frame, Path::new("a.exr")).unwrap());
+        let contains = |file: &[u8], word: &str| file.windows(word.len()).any(|part| part == word.as_bytes());
+        for (word, in_color, in_data) in [
+            ("chromaticities", true, false),
+            ("adoptedNeutral", true, false),
+            ("lin_ap1_scene", true, false),
+            ("colorInteropID\0string\0\x04\0\0\0data", false, true),
+        ] {
+            assert_eq!([contains(&color, word), contains(&data, word)], [in_color, in_data], "{word}");
+        }
     }
 
     #[test]

@@ -4,17 +4,17 @@
 //! failure or SIGKILL such a file may remain. Nothing reads it, and it may be deleted.
 
 use std::{
+    collections::BTreeSet,
     fs::{self, File},
-    io::{self, BufWriter, Write},
+    io::{self, Write},
+    mem,
     path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use tempfile::NamedTempFile;
 
-use super::{
-    overwrite_policy::{OverwriteError, OverwritePolicy},
-    temporary_files::{self, TemporaryFileGuard},
-};
+use super::overwrite_policy::{OverwriteError, OverwritePolicy};
 use crate::error::MediaError;
 
 /// A file that gets its name only when it is finished. If dropped before, it is deleted.
@@ -30,20 +30,12 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Creates the parent folders of `path`, and a temporary file in the same folder (that of the target, if `path` is a link).
+    /// Creates the parent folders of `path`, and a temporary file in the same folder (that of the target, if `path` is a link). It replaces an existing file
+    /// only if `policy` allows it. This is checked now and again when it is finished.
     ///
     /// # Errors
-    /// The folder cannot be created or written, the disk is full, or `path` is a folder, a device or a pipe.
-    pub fn create(path: &Path) -> Result<Self, MediaError> {
-        Self::create_with(path, &OverwritePolicy::any())
-    }
-
-    /// As [`AtomicFile::create`], for a file that replaces an existing one only if `policy` allows it. This is checked now and again when it is
-    /// finished.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::create`], or `path` leads to a file that must not be replaced.
-    pub fn create_with(path: &Path, policy: &OverwritePolicy) -> Result<Self, MediaError> {
+    /// The folder cannot be created or written, the disk is full, `path` is a folder, a device or a pipe, or it leads to a file that must not be replaced.
+    pub fn create(path: &Path, policy: &OverwritePolicy) -> Result<Self, MediaError> {
         let fail = |source| MediaError::from_io(path, source);
         // First, because a path such as `missing/../a.png` can only be resolved when its folders exist.
         fs::create_dir_all(folder_of(path)).map_err(|source| match source.kind() {
@@ -57,6 +49,8 @@ impl AtomicFile {
             Ok(existing) if !existing.is_file() => return Err(MediaError::NotAFile { path: path.to_path_buf() }),
             _ => {}
         }
+        // Before the link is followed.
+        check_policy(policy, path, path)?;
         let target = match fs::canonicalize(path) {
             Ok(target) if path.is_symlink() => target,
             // A dangling link is replaced; a link to itself is an error.
@@ -64,7 +58,7 @@ impl AtomicFile {
             _ => path.to_path_buf(),
         };
         check_policy(policy, &target, path)?;
-        let (temporary, guard) = temporary_files::create(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
+        let (temporary, guard) = create_registered(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
         Ok(Self { temporary, _guard: guard, path: path.to_path_buf(), target, policy: policy.clone() })
     }
 
@@ -102,16 +96,24 @@ impl AtomicFile {
     pub fn finish(self) -> Result<(), MediaError> {
         let path = self.path;
         check_policy(&self.policy, &self.target, &path)?;
-        let fail = |source| MediaError::from_io(&path, source);
         if let Ok(old) = fs::metadata(&self.target) {
-            self.temporary.as_file().set_permissions(old.permissions()).map_err(fail)?;
+            let kept = self.temporary.as_file().set_permissions(old.permissions());
+            kept.map_err(|source| MediaError::from_io(&path, source))?;
         }
-        self.temporary.persist(&self.target).map(drop).map_err(|error| fail(error.error))
+        self.temporary.persist(&self.target).map(drop).map_err(|error| MediaError::from_io(&path, error.error))
     }
 }
 
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Checks that `policy` allows writing to `path`, as [`AtomicFile::create`] does.
+///
+/// # Errors
+/// It leads to a file that must not be replaced.
+pub fn check(path: &Path, policy: &OverwritePolicy) -> Result<(), MediaError> {
+    check_policy(policy, path, path)
 }
 
 /// Whether `target` may be overwritten; `path` is its name in errors.
@@ -120,6 +122,7 @@ fn check_policy(policy: &OverwritePolicy, target: &Path, path: &Path) -> Result<
     policy.check(target).map_err(|error| match error {
         OverwriteError::Input => MediaError::IsInput { path },
         OverwriteError::NotMadeByBansho => MediaError::NotMadeByBansho { path },
+        OverwriteError::Link => MediaError::IsLink { path },
     })
 }
 
@@ -135,32 +138,12 @@ fn temporary_in(folder: &Path, path: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// Writes a file by `fill`, completely or not at all.
-///
-/// # Errors
-/// As [`AtomicFile::create`], or an error of `fill`.
-pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>) -> Result<(), MediaError> {
-    let mut atomic = AtomicFile::create(path)?;
-    let mut buffer = BufWriter::with_capacity(1 << 16, atomic.file());
-    fill(&mut buffer).and_then(|()| buffer.flush()).map_err(|source| MediaError::from_io(path, source))?;
-    drop(buffer);
-    atomic.finish()
-}
-
-/// Writes `bytes` to a file, completely or not at all.
+/// Writes `bytes` to a file, completely or not at all. It replaces an existing file only if `policy` allows it.
 ///
 /// # Errors
 /// As [`AtomicFile::create`], or the bytes cannot be written.
-pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
-    write_bytes_with(path, bytes, &OverwritePolicy::any())
-}
-
-/// As [`write_bytes`], replacing an existing file only if `policy` allows it.
-///
-/// # Errors
-/// As [`AtomicFile::create_with`], or the bytes cannot be written.
-pub fn write_bytes_with(path: &Path, bytes: &[u8], policy: &OverwritePolicy) -> Result<(), MediaError> {
-    let mut atomic = AtomicFile::create_with(path, policy)?;
+pub fn write_bytes(path: &Path, bytes: &[u8], policy: &OverwritePolicy) -> Result<(), MediaError> {
+    let mut atomic = AtomicFile::create(path, policy)?;
     atomic.file().write_all(bytes).map_err(|source| MediaError::from_io(path, source))?;
     atomic.finish()
 }
@@ -170,12 +153,55 @@ pub fn write_bytes_with(path: &Path, bytes: &[u8], policy: &OverwritePolicy) -> 
 /// # Errors
 /// As [`write_bytes`], or the file exists.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), MediaError> {
-    if path.exists() {
+    if fs::symlink_metadata(path).is_ok() {
         return Err(MediaError::AlreadyExists { path: path.to_path_buf() });
     }
-    let mut atomic = AtomicFile::create(path)?;
+    // A link is not followed: even one that leads nowhere has the name.
+    let mut atomic = AtomicFile::create(path, &OverwritePolicy::default().without_links())?;
     atomic.file().write_all(bytes).map_err(|source| MediaError::from_io(path, source))?;
     atomic.finish_new()
+}
+
+/// Temporary files that have not been renamed yet.
+static TEMPORARY_FILES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn temporary_files() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    // The set is always consistent, so a poisoned lock is usable.
+    TEMPORARY_FILES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Registration of a temporary file, removed when dropped.
+#[derive(Debug)]
+struct TemporaryFileGuard(PathBuf);
+
+impl Drop for TemporaryFileGuard {
+    fn drop(&mut self) {
+        temporary_files().remove(&self.0);
+    }
+}
+
+/// Creates a temporary file and registers it.
+fn create_registered(
+    make: impl FnOnce() -> io::Result<NamedTempFile>,
+) -> io::Result<(NamedTempFile, TemporaryFileGuard)> {
+    // Locked while the file is created, so that no file is ever missing from the register.
+    let mut files = temporary_files();
+    let file = make()?;
+    let path: &Path = file.path();
+    files.insert(path.to_path_buf());
+    let guard = TemporaryFileGuard(path.to_path_buf());
+    Ok((file, guard))
+}
+
+/// Removes all temporary files, and blocks forever every thread that creates another one.
+///
+/// For a program that exits right after, without waiting for its other threads. Files with their final names are complete and stay.
+#[expect(clippy::mem_forget, reason = "the lock is kept until the program exits, so that no other file is created")]
+pub fn abandon_all() {
+    let files = temporary_files();
+    // A file that was renamed in the meantime is not found, which is fine.
+    files.iter().for_each(|path| drop(fs::remove_file(path)));
+    mem::forget(files);
 }
 
 #[cfg(test)]
@@ -189,7 +215,7 @@ mod tests {
         write_new(&path, b"first").unwrap();
         assert!(matches!(write_new(&path, b"second"), Err(MediaError::AlreadyExists { .. })));
         // Also one that was created in the meantime.
-        let late = AtomicFile::create(&path).unwrap();
+        let late = AtomicFile::create(&path, &OverwritePolicy::any()).unwrap();
         assert!(matches!(late.finish_new(), Err(MediaError::AlreadyExists { .. })));
         assert_eq!(fs::read(&path).unwrap(), b"first");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
@@ -209,18 +235,18 @@ mod tests {
         let policy = OverwritePolicy::new(inputs, true);
         // Whether the folder that the path passes through is missing or there.
         for _ in 0..2 {
-            let made = write_bytes_with(&at("x/../plate.png"), b"new", &policy);
+            let made = write_bytes(&at("x/../plate.png"), b"new", &policy);
             assert!(matches!(made, Err(MediaError::IsInput { .. })));
         }
         symlink("plate.png", at("soft.png")).unwrap();
         fs::hard_link(at("plate.png"), at("hard.png")).unwrap();
         for name in ["soft.png", "hard.png"] {
-            let error = AtomicFile::create_with(&at(name), &policy).unwrap_err();
+            let error = AtomicFile::create(&at(name), &policy).unwrap_err();
             assert!(matches!(&error, MediaError::IsInput { path } if *path == at(name)), "{error}");
         }
         // The folder becomes a link while the file is written.
         fs::create_dir(at("out")).unwrap();
-        let late = AtomicFile::create_with(&at("out/plate.png"), &policy).unwrap();
+        let late = AtomicFile::create(&at("out/plate.png"), &policy).unwrap();
         let temporary = late.temporary_path().to_path_buf();
         fs::rename(&temporary, folder.path().join(temporary.file_name().unwrap())).unwrap();
         fs::remove_dir(at("out")).unwrap();
@@ -233,11 +259,11 @@ mod tests {
     fn a_file_without_our_mark_that_comes_on_the_way_stays() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        let late = AtomicFile::create_with(&path, &OverwritePolicy::default()).unwrap();
+        let late = AtomicFile::create(&path, &OverwritePolicy::default()).unwrap();
         fs::write(&path, "a photograph").unwrap();
         assert!(matches!(late.finish(), Err(MediaError::NotMadeByBansho { .. })));
         assert!(matches!(
-            write_bytes_with(&path, b"", &OverwritePolicy::default()),
+            write_bytes(&path, b"", &OverwritePolicy::default()),
             Err(MediaError::NotMadeByBansho { .. })
         ));
         assert_eq!((fs::read(&path).unwrap(), names(folder.path())), (b"a photograph".to_vec(), vec!["a.png".into()]));
@@ -249,7 +275,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let link = folder.path().join("0001.png");
         std::os::unix::fs::symlink("/dev/null", &link).unwrap();
-        assert!(matches!(write_bytes(&link, b"x"), Err(MediaError::NotAFile { .. })));
+        assert!(matches!(write_bytes(&link, b"x", &OverwritePolicy::any()), Err(MediaError::NotAFile { .. })));
     }
 
     #[cfg(unix)]
@@ -258,7 +284,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let link = folder.path().join("a.png");
         std::os::unix::fs::symlink("a.png", &link).unwrap();
-        assert!(matches!(write_bytes(&link, b"x"), Err(MediaError::Io { .. })));
+        assert!(matches!(write_bytes(&link, b"x", &OverwritePolicy::any()), Err(MediaError::Io { .. })));
         assert!(link.is_symlink());
     }
 
@@ -270,8 +296,8 @@ mod tests {
     fn a_finished_file_replaces_the_old_one_and_leaves_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new/deep/a.png");
-        write_bytes(&path, b"first").unwrap();
-        write(&path, |file| file.write_all(b"second")).unwrap();
+        write_bytes(&path, b"first", &OverwritePolicy::any()).unwrap();
+        write_bytes(&path, b"second", &OverwritePolicy::any()).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
         assert_eq!(names(path.parent().unwrap()), ["a.png"]);
     }
@@ -280,12 +306,10 @@ mod tests {
     fn a_failed_write_keeps_the_old_file_and_removes_the_temporary_one() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        write_bytes(&path, b"old").unwrap();
-        let error = write(&path, |file| {
-            file.write_all(b"half")?;
-            Err(io::ErrorKind::StorageFull.into())
-        });
-        assert!(matches!(error, Err(MediaError::DiskFull { .. })));
+        write_bytes(&path, b"old", &OverwritePolicy::any()).unwrap();
+        let mut half = AtomicFile::create(&path, &OverwritePolicy::any()).unwrap();
+        half.file().write_all(b"half").unwrap();
+        drop(half);
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.png"]);
     }
@@ -294,7 +318,10 @@ mod tests {
     fn while_it_is_written_it_is_hidden_and_two_writers_do_not_meet() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        let (one, two) = (AtomicFile::create(&path).unwrap(), AtomicFile::create(&path).unwrap());
+        let (one, two) = (
+            AtomicFile::create(&path, &OverwritePolicy::any()).unwrap(),
+            AtomicFile::create(&path, &OverwritePolicy::any()).unwrap(),
+        );
         assert_ne!(one.temporary_path(), two.temporary_path());
         assert!(names(folder.path()).iter().all(|name| name.starts_with(".a.png.") && name.ends_with(".part")));
         drop((one, two));
@@ -304,18 +331,24 @@ mod tests {
     #[test]
     fn a_folder_and_a_file_in_the_way_are_named() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(matches!(write_bytes(folder.path(), b""), Err(MediaError::IsFolder { .. })));
+        assert!(matches!(write_bytes(folder.path(), b"", &OverwritePolicy::any()), Err(MediaError::IsFolder { .. })));
         let file = folder.path().join("file");
-        write_bytes(&file, b"").unwrap();
-        assert!(matches!(write_bytes(&file.join("a.png"), b""), Err(MediaError::NotAFolder { .. })));
-        assert!(matches!(write_bytes(&file.join("deep/a.png"), b""), Err(MediaError::NotAFolder { .. })));
+        write_bytes(&file, b"", &OverwritePolicy::any()).unwrap();
+        assert!(matches!(
+            write_bytes(&file.join("a.png"), b"", &OverwritePolicy::any()),
+            Err(MediaError::NotAFolder { .. })
+        ));
+        assert!(matches!(
+            write_bytes(&file.join("deep/a.png"), b"", &OverwritePolicy::any()),
+            Err(MediaError::NotAFolder { .. })
+        ));
     }
 
     #[test]
     fn a_very_long_name_still_has_a_temporary_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(format!("{}.png", "火".repeat(80)));
-        write_bytes(&path, b"x").unwrap();
+        write_bytes(&path, b"x", &OverwritePolicy::any()).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"x");
     }
 
@@ -325,10 +358,10 @@ mod tests {
         use std::os::unix::fs::{PermissionsExt, symlink};
         let folder = tempfile::tempdir().unwrap();
         let (file, link) = (folder.path().join("deep/a.toml"), folder.path().join("link.toml"));
-        write_bytes(&file, b"old").unwrap();
+        write_bytes(&file, b"old", &OverwritePolicy::any()).unwrap();
         fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
         symlink("deep/a.toml", &link).unwrap();
-        write_bytes(&link, b"new").unwrap();
+        write_bytes(&link, b"new", &OverwritePolicy::any()).unwrap();
         assert!(link.is_symlink() && fs::read(&file).unwrap() == b"new");
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
     }
@@ -340,7 +373,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (plain, whole) = (folder.path().join("plain"), folder.path().join("whole"));
         fs::write(&plain, b"").unwrap();
-        write_bytes(&whole, b"").unwrap();
+        write_bytes(&whole, b"", &OverwritePolicy::any()).unwrap();
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
         assert_eq!(mode(&whole), mode(&plain));
     }

@@ -45,6 +45,7 @@ pub fn resolved(path: &Path) -> PathBuf {
     for component in path.components() {
         match component {
             Component::CurDir => {}
+            // The path so far has no links any more, so that this is the parent that the system means.
             Component::ParentDir => {
                 resolved.pop();
             }

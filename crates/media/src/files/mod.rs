@@ -6,4 +6,3 @@ pub mod input;
 pub mod naming;
 pub mod overwrite_policy;
 pub mod provenance;
-pub mod temporary_files;

@@ -38,7 +38,7 @@ pub enum NamingError {
         path: PathBuf,
     },
     /// A percent sign that begins no placeholder.
-    #[error("{path}: `%` must begin %d or %04d; write %% for a literal percent sign", path = .path.display())]
+    #[error("{path}: `%` must begin %d or %04d; write %% for a literal percent sign, %# for a literal #", path = .path.display())]
     BadPercent {
         /// The name.
         path: PathBuf,
@@ -87,12 +87,17 @@ pub(crate) enum TemplateError {
 }
 
 impl FrameTemplate {
-    /// Parses runs of `#` and, with `printf`, `%d`, `%04d` and `%%`.
+    /// Parses runs of `#` and, with `printf`, `%d`, `%04d`, `%%` and `%#` for a literal `#`; a single `#` before a digit is then literal, too, since
+    /// `shot#12` is the twelfth shot rather than `shot112`.
     pub(crate) fn parse(name: &str, printf: bool) -> Result<Self, TemplateError> {
         let mut template = Self { prefix: String::new(), digits: None, suffix: String::new() };
         let mut rest = name;
         while let Some(first) = rest.chars().next() {
             let (placeholder, length) = match first {
+                '#' if printf && is_literal_hash(rest) => {
+                    template.push_literal('#');
+                    (None, 1)
+                }
                 '#' => {
                     let run = rest.len() - rest.trim_start_matches('#').len();
                     if run > MAX_DIGITS {
@@ -104,6 +109,10 @@ impl FrameTemplate {
                     template.push_literal('%');
                     (None, 2)
                 }
+                '%' if printf && rest.starts_with("%#") => {
+                    template.push_literal('#');
+                    (None, 2)
+                }
                 '%' if printf => {
                     let (digits, length) = printf_digits(rest).ok_or(TemplateError::BadPercent)?;
                     (Some(digits), length)
@@ -113,6 +122,7 @@ impl FrameTemplate {
                     (None, other.len_utf8())
                 }
             };
+            // A second one would be ambiguous, as to which of them is the frame.
             if placeholder.is_some() && template.digits.replace(placeholder.unwrap_or(0)).is_some() {
                 return Err(TemplateError::TwoPlaceholders);
             }
@@ -125,25 +135,85 @@ impl FrameTemplate {
         if self.digits.is_some() { self.suffix.push(letter) } else { self.prefix.push(letter) }
     }
 
-    /// The name for frame `number`: the sign first, then the digits, padded with zeros.
+    /// The name for frame `number`, padded with zeros as by `printf`, whose width includes the sign: -3 is `-003`.
     pub(crate) fn name(&self, number: i64) -> String {
+        let Some(width) = self.digits else { return self.prefix.clone() };
+        format!("{}{number:0width$}{}", self.prefix, self.suffix)
+    }
+
+    /// The name for frame `number` with the sign beside the padded digits: -3 is `-0003`.
+    pub(crate) fn name_with_full_digits(&self, number: i64) -> String {
         let Some(digits) = self.digits else { return self.prefix.clone() };
         let sign = if number < 0 { "-" } else { "" };
         format!("{}{sign}{:0digits$}{}", self.prefix, number.unsigned_abs(), self.suffix)
     }
 }
 
+/// A placeholder for the frame number that other programs know, in the name of a file: `%04d` and `%d` (Nuke, ffmpeg), `$F4` and `$F` (Houdini), `@@@@` (shake,
+/// RV), `<frame>`, `<f4>` (Katana, Maya) or `{frame}`; and its number of digits.
+pub(crate) fn other_placeholder(name: &str) -> Option<(&str, usize)> {
+    for (start, _) in name.char_indices() {
+        let rest = &name[start..];
+        let placeholder = printf_digits(rest)
+            .or_else(|| houdini_digits(rest))
+            .or_else(|| {
+                // A single `@` is rather part of a name, as in `icon@2x`.
+                let run = rest.len() - rest.trim_start_matches('@').len();
+                (run > 1 && run <= MAX_DIGITS).then_some((run, run))
+            })
+            .or_else(|| enclosed_digits(rest, '<', '>'))
+            .or_else(|| enclosed_digits(rest, '{', '}'));
+        if let Some((digits, length)) = placeholder {
+            return Some((&rest[..length], digits.max(1)));
+        }
+    }
+    None
+}
+
+/// `$F` or `$F4` at the start of `text`: its width in digits, and the length of the placeholder.
+fn houdini_digits(text: &str) -> Option<(usize, usize)> {
+    let after = text.strip_prefix("$F")?;
+    let stated = &after[..after.len() - after.trim_start_matches(|letter: char| letter.is_ascii_digit()).len()];
+    let digits = if stated.is_empty() { 1 } else { stated_digits(stated)? };
+    Some((digits, 2 + stated.len()))
+}
+
+/// `<frame>` or `<f4>`, with these brackets, at the start of `text`: its width in digits, and the length of the placeholder.
+fn enclosed_digits(text: &str, open: char, close: char) -> Option<(usize, usize)> {
+    const UNSTATED_DIGITS: usize = 4;
+    let inner = text.strip_prefix(open)?.split(close).next().filter(|inner| inner.len() + 2 <= text.len())?;
+    let stated = inner.strip_prefix("frame").or_else(|| inner.strip_prefix('f'))?;
+    let digits = if stated.is_empty() { UNSTATED_DIGITS } else { stated_digits(stated)? };
+    Some((digits, inner.len() + 2))
+}
+
+/// A number of digits that a placeholder may have.
+fn stated_digits(number: &str) -> Option<usize> {
+    number.parse().ok().filter(|digits| (1..=MAX_DIGITS).contains(digits))
+}
+
+/// Whether `text` begins with a single `#` before a digit.
+fn is_literal_hash(text: &str) -> bool {
+    text.strip_prefix('#').is_some_and(|rest| rest.starts_with(|letter: char| letter.is_ascii_digit()))
+}
+
+/// `name` as a pattern for this name: no sign in it is taken for a placeholder.
+pub fn literal_pattern(name: &str) -> String {
+    name.replace('%', "%%").replace('#', "%#")
+}
+
 /// `%d`, `%4d` or `%04d` at the start of `text`: its width in digits, and the length of the placeholder.
 fn printf_digits(text: &str) -> Option<(usize, usize)> {
     let inner = text.strip_prefix('%')?;
     let width = &inner[..inner.find('d')?];
+    // `+4` would be parsed as a number.
     let digits = if width.is_empty() { 1 } else { width.parse().ok().filter(|_| !width.starts_with('+'))? };
     (digits <= MAX_DIGITS).then_some((digits, width.len() + 2))
 }
 
 /// Default name of the sequence of pictures of a scene with the file stem `stem`.
 pub fn default_sequence(stem: &str) -> String {
-    format!("{stem}.####.png")
+    format!("{}.####.png", literal_pattern(stem))
 }
 
 /// Name of the picture of frame `number` in [`default_sequence`].
@@ -167,10 +237,10 @@ impl NumberedPath {
     /// Another extension, two placeholders, or a percent sign that begins none.
     pub fn parse(path: &Path, extension: &'static str, count: usize) -> Result<Self, NamingError> {
         let name = file_name(path)?;
-        let own = extension_of(path, name)?;
-        if !own.eq_ignore_ascii_case(extension) {
+        let stated = extension_of(path, name)?;
+        if !stated.eq_ignore_ascii_case(extension) {
             let path = path.to_path_buf();
-            return Err(NamingError::OtherExtension { path, extension: own.to_owned(), allowed: extension });
+            return Err(NamingError::OtherExtension { path, extension: stated.to_owned(), allowed: extension });
         }
         let mut numbered = Self::read(path, name)?;
         if count != 1 {
@@ -180,11 +250,13 @@ impl NumberedPath {
     }
 
     fn read(path: &Path, name: &str) -> Result<Self, NamingError> {
-        let owned = || path.to_path_buf();
-        let template = FrameTemplate::parse(name, true).map_err(|error| match error {
-            TemplateError::TwoPlaceholders => NamingError::TwoPlaceholders { path: owned() },
-            TemplateError::BadPercent => NamingError::BadPercent { path: owned() },
-            TemplateError::ManyDigits(digits) => NamingError::ManyDigits { path: owned(), digits },
+        let template = FrameTemplate::parse(name, true).map_err(|error| {
+            let path = path.to_path_buf();
+            match error {
+                TemplateError::TwoPlaceholders => NamingError::TwoPlaceholders { path },
+                TemplateError::BadPercent => NamingError::BadPercent { path },
+                TemplateError::ManyDigits(digits) => NamingError::ManyDigits { path, digits },
+            }
         })?;
         Ok(Self { folder: path.parent().map(Path::to_path_buf).unwrap_or_default(), template })
     }
@@ -205,6 +277,11 @@ impl NumberedPath {
         self.template.digits.is_some()
     }
 
+    /// What stands before the frame number, and before the first dot.
+    fn stem(&self) -> &str {
+        self.template.prefix.split('.').next().unwrap_or_default()
+    }
+
     /// The path with a `#` for each digit of the frame number.
     pub fn template_path(&self) -> PathBuf {
         let FrameTemplate { prefix, digits, suffix } = &self.template;
@@ -215,6 +292,20 @@ impl NumberedPath {
     pub fn path(&self, number: i64) -> PathBuf {
         self.folder.join(self.template.name(number))
     }
+}
+
+/// What looks like a frame number in an output path and is part of its name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LiteralPart {
+    /// A single `#` before a digit.
+    #[error("a single # before a digit is part of the name; ## or %d is the frame number")]
+    Hash,
+    /// A placeholder in the name of a folder.
+    #[error("the folder `{folder}` is called so: only the name of the file may have a frame number")]
+    Folder {
+        /// The name of the folder.
+        folder: String,
+    },
 }
 
 /// The output path of a job.
@@ -241,6 +332,31 @@ impl OutputPattern {
             numbered.insert_placeholder();
         }
         Ok(Self { numbered, kind })
+    }
+
+    /// What stands before the frame number, and before the first dot.
+    pub fn stem(&self) -> &str {
+        self.numbered.stem()
+    }
+
+    /// What in `path` looks like a frame number and is none, if anything does.
+    pub fn literal_part(path: &Path) -> Option<LiteralPart> {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        // The first of two signs has a meaning for the second.
+        let pairs = name.as_bytes().windows(2).enumerate();
+        let mut starts = pairs
+            .filter(|(start, pair)| pair[0] == b'#' && (*start == 0 || !b"#%".contains(&name.as_bytes()[start - 1])));
+        if starts.any(|(start, _)| is_literal_hash(&name[start..])) {
+            return Some(LiteralPart::Hash);
+        }
+        for folder in path.parent()? {
+            let folder = folder.to_string_lossy().into_owned();
+            let mut percent_signs = folder.match_indices('%');
+            if folder.contains("##") || percent_signs.any(|(at, _)| printf_digits(&folder[at..]).is_some()) {
+                return Some(LiteralPart::Folder { folder });
+            }
+        }
+        None
     }
 
     /// The format.
@@ -316,11 +432,34 @@ mod tests {
         for pattern in ["out/frame.####.exr", "out/frame.%04d.exr"] {
             assert_eq!(name(pattern, 9, 7), "out/frame.0007.exr");
             assert_eq!(name(pattern, 9, 12345), "out/frame.12345.exr");
-            assert_eq!(name(pattern, 9, -3), "out/frame.-0003.exr");
+            // As printf("%04d", -3), whose width includes the sign.
+            assert_eq!(name(pattern, 9, -3), "out/frame.-003.exr");
+            assert_eq!(name(pattern, 9, -12_345), "out/frame.-12345.exr");
         }
         assert_eq!(name("#.png", 9, 12), "12.png");
         assert_eq!(name("f%d.png", 9, 5), "f5.png");
         assert_eq!(name("f.######.PNG", 1, 5), "f.000005.PNG");
+    }
+
+    #[test]
+    fn the_placeholders_of_other_programs_are_known() {
+        for (name, placeholder, digits) in [
+            ("p.%04d.png", "%04d", 4),
+            ("p.%d.png", "%d", 1),
+            ("p.$F4.exr", "$F4", 4),
+            ("p.$F.exr", "$F", 1),
+            ("p.@@@@.exr", "@@@@", 4),
+            ("p.<frame>.png", "<frame>", 4),
+            ("p.<f4>.png", "<f4>", 4),
+            ("p_{frame}.png", "{frame}", 4),
+        ] {
+            assert_eq!(other_placeholder(name), Some((placeholder, digits)), "{name}");
+        }
+        for plain in
+            ["p.####.png", "50%.png", "a@b.png", "$HOME.png", "<x>.png", "ünï<.png", "%.png", "f.png", "{}.png"]
+        {
+            assert_eq!(other_placeholder(plain), None, "{plain}");
+        }
     }
 
     #[test]
@@ -331,6 +470,47 @@ mod tests {
         {
             assert_eq!(all(pattern, frames), Path::new(expected));
         }
+    }
+
+    #[test]
+    fn names_that_come_from_a_scene_are_literal() {
+        for stem in ["a#b", "50%", "sh#t", "#", "##.##", "100%d", "%%", "%#", "take####", "s#1", "a.%04d"] {
+            let sequence = default_sequence(stem);
+            assert_eq!(name(&sequence, 2, 7), format!("{stem}.0007.png"));
+            assert_eq!(name(&sequence, 1, 7), format!("{stem}.0007.png"));
+            assert_eq!(name(&format!("{}.sheet.png", literal_pattern(stem)), 1, 7), format!("{stem}.sheet.png"));
+        }
+    }
+
+    #[test]
+    fn a_single_hash_before_a_digit_is_literal() {
+        use LiteralPart::{Folder, Hash};
+        let literal = |path: &str| OutputPattern::literal_part(Path::new(path));
+        for (path, first, part) in [
+            ("shot#12.png", "shot#12.png", Some(Hash)),
+            ("#1.png", "#1.png", Some(Hash)),
+            ("shot#12.####.png", "shot#12.0003.png", Some(Hash)),
+            ("shot##12.png", "shot0312.png", None),
+            ("shot%#12.png", "shot#12.png", None),
+            ("shot.#.png", "shot.3.png", None),
+            ("a#b.png", "a3b.png", None),
+            ("take####/a.png", "take####/a.png", Some(Folder { folder: "take####".into() })),
+            ("take%04d/a.png", "take%04d/a.png", Some(Folder { folder: "take%04d".into() })),
+            ("c#/50%/a.png", "c#/50%/a.png", None),
+        ] {
+            assert_eq!((name(path, 1, 3), literal(path)), (first.to_owned(), part), "{path}");
+        }
+        assert_eq!(name("shot#12.png", 2, 3), "shot#12.0003.png");
+    }
+
+    #[test]
+    fn the_stem_is_what_stands_before_the_number() {
+        for (path, stem) in
+            [("a/fire.####.exr", "fire"), ("fire_%04d.png", "fire_"), ("50%%.#.png", "50%"), ("a%#b.v2.png", "a#b")]
+        {
+            assert_eq!(OutputPattern::parse(Path::new(path), 2).unwrap().stem(), stem, "{path}");
+        }
+        assert_eq!(OutputPattern::parse(Path::new("####.png"), 2).unwrap().stem(), "");
     }
 
     #[test]

@@ -13,6 +13,9 @@
 //! | PLY | a comment that begins with `Bansho:` | header |
 //! | SVG | a comment that begins with `bansho:` | after the first tag |
 //! | CSV | a comment that begins with `bansho:` | first line |
+//! | shell script | a comment that begins with `bansho:` | second line, after `#!` |
+//! | YAML, word files of farms | a comment that begins with `bansho:` | first line |
+//! | manual page | a comment that begins with `bansho:` | first line |
 //! | snapshot | its first eight bytes | start |
 //!
 //! A file that was truncated after its mark, for example by a power failure, still has it. Without a mark are a truncated MOV, a file
@@ -34,6 +37,12 @@ pub const SNAPSHOT_MAGIC: [u8; 8] = *b"BANSHOSS";
 
 /// Comment of GIF, SVG and CSV files, and tag of films.
 pub const COMMENT_TAG: &str = concat!("bansho:version=", env!("CARGO_PKG_VERSION"));
+/// First line of text files whose comments begin with `#`, and second line of shell scripts.
+pub const COMMENT_LINE: &str = concat!("# bansho:version=", env!("CARGO_PKG_VERSION"), "\n");
+/// First line of manual pages.
+pub const MANUAL_LINE: &str = concat!(".\\\" bansho:version=", env!("CARGO_PKG_VERSION"), "\n");
+/// How a comment of a manual page begins.
+const MANUAL_COMMENT: &[u8] = b".\\\" ";
 /// Prefix of all keys, names and comments that mark a file.
 const PREFIX: &[u8] = b"bansho:";
 
@@ -62,7 +71,7 @@ fn has_mark(path: &Path) -> io::Result<bool> {
     let head = read_range(&mut file, 0..HEAD_BYTES)?;
     Ok(match &head[..] {
         head if head.starts_with(&chunk::SIGNATURE) => in_png(head),
-        head if head.starts_with(&exr::attribute::MAGIC) => {
+        head if head.starts_with(&exr::header::MAGIC) => {
             in_exr(head) || length > HEAD_BYTES && in_exr(&read_range(&mut file, 0..EXR_HEADER_BYTES)?)
         }
         head if head.starts_with(b"GIF8") => in_gif(head).is_some(),
@@ -73,6 +82,8 @@ fn has_mark(path: &Path) -> io::Result<bool> {
         head if head.starts_with(b"ply\n") => in_ply(head),
         head if head.starts_with(b"<svg") => in_svg(head),
         head if head.starts_with(b"# ") => starts_with_prefix(&head[2..]),
+        head if head.starts_with(b"#!") => in_script(head),
+        head if head.starts_with(MANUAL_COMMENT) => starts_with_prefix(&head[MANUAL_COMMENT.len()..]),
         head if head.starts_with(&SNAPSHOT_MAGIC) => true,
         head => in_json(head) || in_gltf(head),
     })
@@ -102,7 +113,7 @@ fn in_png(head: &[u8]) -> bool {
 }
 
 fn in_exr(head: &[u8]) -> bool {
-    let header = exr::parse::parse_header(head);
+    let header = exr::header::parse_header(head);
     header.is_ok_and(|header| {
         header.parts.iter().flat_map(|part| &part.strings).any(|(name, _)| starts_with_prefix(name.as_bytes()))
     })
@@ -112,6 +123,7 @@ fn in_exr(head: &[u8]) -> bool {
 fn in_gif(head: &[u8]) -> Option<()> {
     const EXTENSION: u8 = 0x21;
     const COMMENT: u8 = 0xfe;
+    // The size of the global palette, if there is one, is 2 to the power of three bits plus 1, three bytes each.
     let flags = *head.get(10)?;
     let palette = if flags & 0x80 == 0 { 0 } else { 3 << ((flags & 7) + 1) };
     let mut rest = head.get(13 + palette..)?;
@@ -120,6 +132,7 @@ fn in_gif(head: &[u8]) -> Option<()> {
         if *label == COMMENT && starts_with_prefix(blocks.get(..usize::from(*length))?) {
             return Some(());
         }
+        // The data of an extension are blocks, up to an empty one.
         let mut length = *length;
         while length != 0 {
             blocks = blocks.get(usize::from(length)..)?;
@@ -150,6 +163,7 @@ fn find_box(file: &mut File, within: Range<u64>, expected: [u8; 4]) -> io::Resul
         let head = read_range(file, at..within.end.min(at.saturating_add(16)))?;
         let Some((size, kind)) = head.first_chunk().copied().zip(head.get(4..8)) else { break };
         let (size, start) = match (u32::from_be_bytes(size), head.get(8..16).and_then(|long| long.try_into().ok())) {
+            // 0: up to the end of the file. 1: the size is in 64 bits behind the kind.
             (0, _) => (within.end - at, 8),
             (1, Some(long)) => (u64::from_be_bytes(long), 16),
             (size, _) => (u64::from(size), 8),
@@ -166,6 +180,11 @@ fn find_box(file: &mut File, within: Range<u64>, expected: [u8; 4]) -> io::Resul
     Ok(None)
 }
 
+fn in_script(head: &[u8]) -> bool {
+    let second = head.split(|&byte| byte == b'\n').nth(1);
+    second.and_then(|line| line.strip_prefix(b"# ")).is_some_and(starts_with_prefix)
+}
+
 fn in_ply(head: &[u8]) -> bool {
     let mut lines = head.split(|&byte| byte == b'\n').take_while(|line| *line != b"end_header");
     lines.any(|line| line.strip_prefix(b"comment ").is_some_and(starts_with_prefix))
@@ -179,20 +198,27 @@ fn in_svg(head: &[u8]) -> bool {
 }
 
 fn in_gltf(head: &[u8]) -> bool {
-    let mut bytes = head.iter().copied().filter(|byte| !byte.is_ascii_whitespace());
-    b"{\"asset\":{\"generator\":\"Bansho".iter().all(|&byte| bytes.next() == Some(byte))
+    begins_with(&mut without_white_space(head), b"{\"asset\":{\"generator\":\"Bansho")
 }
 
 fn in_json(head: &[u8]) -> bool {
-    let mut bytes = head.iter().copied().filter(|byte| !byte.is_ascii_whitespace());
-    let mut follows = |text: &[u8]| text.iter().all(|&byte| bytes.next() == Some(byte));
-    if !follows(b"{\"format\":") {
+    let mut bytes = without_white_space(head);
+    if !begins_with(&mut bytes, b"{\"format\":") {
         return false;
     }
-    let version = bytes.by_ref().take_while(u8::is_ascii_digit).count();
-    let mut follows = |text: &[u8]| text.iter().all(|&byte| bytes.next() == Some(byte));
+    let version_digits = bytes.by_ref().take_while(u8::is_ascii_digit).count();
     // `take_while` consumed the comma after the number.
-    (1..9).contains(&version) && follows(b"\"program\":\"Bansho")
+    (1..9).contains(&version_digits) && begins_with(&mut bytes, b"\"program\":\"Bansho")
+}
+
+/// JSON may have white space between any two of its words.
+fn without_white_space(json: &[u8]) -> impl Iterator<Item = u8> {
+    json.iter().copied().filter(|byte| !byte.is_ascii_whitespace())
+}
+
+/// Whether the next bytes are those of `text`.
+fn begins_with(bytes: &mut impl Iterator<Item = u8>, text: &[u8]) -> bool {
+    text.iter().all(|&byte| bytes.next() == Some(byte))
 }
 
 #[cfg(test)]
@@ -206,7 +232,7 @@ mod tests {
         files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
         format::PictureFormat,
         gltf,
-        output::sink::{FrameSlot, Picture, Sink, SinkOptions},
+        output::sink::{FinishedPicture, FrameSlot, Sink, SinkOptions},
         ply, testing,
     };
 
@@ -221,8 +247,8 @@ mod tests {
             let picture = bansho_base::frame::DisplayImage { opaque, ..testing::display(34, 16, index) };
             let linear = testing::frame(34, 16);
             let picture = match sink.picture_format() {
-                PictureFormat::Frame => Picture::Linear(&linear),
-                _ => Picture::Display(&picture, &[7; 32]),
+                PictureFormat::Frame => FinishedPicture::Linear(&linear),
+                _ => FinishedPicture::Display(&picture, &[7; 32]),
             };
             sink.write(slot, picture).unwrap();
         }

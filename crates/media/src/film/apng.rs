@@ -6,10 +6,11 @@ use std::{io::Write, path::Path};
 
 use bansho_base::frame::DisplayImage;
 
-use super::{ordered::FilmEncoder, timing};
+use super::ordered::FilmEncoder;
 use crate::{
     error::MediaError,
     files::{atomic::AtomicFile, overwrite_policy::OverwritePolicy},
+    frame_rate,
     imageops::flatten,
     png::{self, chunk},
 };
@@ -22,6 +23,7 @@ pub(crate) struct ApngFormat {
     pub(crate) fps: [u32; 2],
 }
 
+/// A film in progress.
 pub(crate) struct ApngFilm {
     file: AtomicFile,
     format: ApngFormat,
@@ -33,19 +35,21 @@ pub(crate) struct ApngFilm {
 impl ApngFilm {
     pub(crate) fn create(path: &Path, format: ApngFormat, overwrite: &OverwritePolicy) -> Result<Self, MediaError> {
         let [numerator, denominator] = format.fps;
-        let delay = timing::apng_delay(format.fps).ok_or_else(|| MediaError::FrameRate {
+        let delay = frame_rate::apng_delay(format.fps).ok_or_else(|| MediaError::FrameRate {
             path: path.to_path_buf(),
             numerator,
             denominator,
         })?;
-        Ok(Self { file: AtomicFile::create_with(path, overwrite)?, format, delay, sequence: 0 })
+        Ok(Self { file: AtomicFile::create(path, overwrite)?, format, delay, sequence: 0 })
     }
 
+    /// The next number; control and data chunks are numbered together.
     fn next_sequence(&mut self) -> [u8; 4] {
         self.sequence += 1;
         (self.sequence - 1).to_be_bytes()
     }
 
+    /// Appends the control chunk of a frame: its rectangle, its delay and how it replaces the last.
     fn push_control(&mut self, bytes: &mut Vec<u8>) {
         let sequence = self.next_sequence();
         let [width, height] = self.format.size.map(|side| (side as u32).to_be_bytes());
@@ -74,6 +78,7 @@ impl FilmEncoder for ApngFilm {
             bytes.extend(chunk::SIGNATURE);
         }
         let mut has_control = false;
+        // The file begins with the chunks of the first frame, which say what all frames have in common. Of the others only the pixels are kept, as fdAT.
         for chunk in chunk::chunks(&encoded).into_iter().flatten().flatten() {
             match &chunk.kind {
                 b"IDAT" => {
@@ -93,6 +98,7 @@ impl FilmEncoder for ApngFilm {
                     chunk::push(&mut bytes, *kind, &[chunk.contents]);
                     if kind == b"IHDR" {
                         let frames = (self.format.frame_count as u32).to_be_bytes();
+                        // 0 plays: without end.
                         chunk::push(&mut bytes, *b"acTL", &[&frames, &[0; 4]]);
                     }
                 }

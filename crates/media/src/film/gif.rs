@@ -11,16 +11,16 @@ use std::{
 };
 
 use ::gif::{DisposalMethod, Encoder, Extension, Repeat};
-use bansho_base::frame::{DisplayImage, DisplayPixels};
+use bansho_base::frame::{DisplayEncoding, DisplayImage, DisplayPixels};
 
 use super::{
     ordered::FilmEncoder,
     palette::{Ditherer, FrameHistogram, Histogram, palette},
-    timing::GifTiming,
 };
 use crate::{
     error::{MediaError, SizeRule},
     files::{atomic::AtomicFile, overwrite_policy::OverwritePolicy, provenance},
+    frame_rate::GifTiming,
     imageops::flatten,
     png,
 };
@@ -70,7 +70,7 @@ impl GifFilm {
             let allowed = SizeRule::UpTo(SIDE_LIMIT);
             return Err(MediaError::Size { path: path.to_path_buf(), width, height, allowed });
         }
-        let file = AtomicFile::create_with(path, overwrite)?;
+        let file = AtomicFile::create(path, overwrite)?;
         let folder = file.temporary_path().parent().unwrap_or(Path::new("."));
         let spool = tempfile::tempfile_in(folder).map_err(|source| MediaError::from_io(path, source))?;
         Ok(Self { file, spool, spooled: Vec::new(), histogram: Histogram::new(), format, received: 0 })
@@ -96,6 +96,7 @@ pub(crate) fn prepare(
     } else {
         flatten::to_eight_bits(&flatten::over_black(picture).pixels)
     };
+    // Transparent pixels need no entry of the palette.
     let mut histogram = FrameHistogram::new();
     pixels.iter().filter(|pixel| pixel[3] == 255).for_each(|&[r, g, b, _]| histogram.count([r, g, b]));
     let picture = DisplayImage {
@@ -103,6 +104,7 @@ pub(crate) fn prepare(
         height: picture.height,
         opaque: !format.transparent,
         alpha: picture.alpha,
+        encoding: DisplayEncoding::Srgb,
         pixels: DisplayPixels::Eight(pixels),
     };
     Ok(GifFrame(Some((png::encode_frame(&picture, path)?, histogram))))
@@ -123,9 +125,10 @@ impl FilmEncoder for GifFilm {
 
     fn finish(mut self) -> Result<(), MediaError> {
         let path = self.file.path().to_path_buf();
+        // One of 256 entries is for transparency.
         let entries = palette(&self.histogram, if self.format.transparent { 255 } else { 256 });
         let transparent = self.format.transparent.then_some(entries.len() as u8);
-        let writer = Writer {
+        let writer = GifWriter {
             ditherer: Ditherer::new(&entries, &self.histogram),
             transparent,
             format: &self.format,
@@ -139,14 +142,15 @@ impl FilmEncoder for GifFilm {
     }
 }
 
-struct Writer<'a> {
+/// Writes the frames of a film with its palette.
+struct GifWriter<'a> {
     ditherer: Ditherer,
     transparent: Option<u8>,
     format: &'a GifFormat,
     path: &'a Path,
 }
 
-impl Writer<'_> {
+impl GifWriter<'_> {
     fn write(
         &self,
         spool: &mut File,
@@ -160,14 +164,15 @@ impl Writer<'_> {
         let comment = encoder.write_raw_extension(Extension::Comment.into(), &[provenance::COMMENT_TAG.as_bytes()]);
         comment.map_err(|error| self.encoding(error))?;
         for batch in spooled.chunks(BATCH) {
-            let read = |spooled: &SpooledFrame| {
-                let mut bytes = vec![0; spooled.length];
+            // Read one after another, as they are in the file; dithered and compressed in parallel; written in their order.
+            let mut files = Vec::with_capacity(batch.len());
+            for frame in batch {
+                let mut bytes = vec![0; frame.length];
                 spool.read_exact(&mut bytes).map_err(|source| MediaError::from_io(self.path, source))?;
-                Ok((spooled.index, bytes))
-            };
-            let batch: Vec<(usize, Vec<u8>)> = batch.iter().map(read).collect::<Result<_, MediaError>>()?;
+                files.push((frame.index, bytes));
+            }
             let frames: Vec<_> =
-                batch.into_par_iter().map(|(index, bytes)| self.frame(index, &bytes)).collect::<Result<_, _>>()?;
+                files.into_par_iter().map(|(index, bytes)| self.frame(index, &bytes)).collect::<Result<_, _>>()?;
             for frame in &frames {
                 encoder.write_lzw_pre_encoded_frame(frame).map_err(|error| self.encoding(error))?;
             }
@@ -195,6 +200,7 @@ impl Writer<'_> {
             width: width as u16,
             height: height as u16,
             delay: self.format.timing.delay_cs(index, self.format.frame_count),
+            // A transparent frame does not cover the one before, which is therefore cleared.
             dispose: if self.transparent.is_some() { DisposalMethod::Background } else { DisposalMethod::Keep },
             transparent: self.transparent,
             buffer: indices.into(),
@@ -229,7 +235,14 @@ mod tests {
     fn ramp(index: usize) -> DisplayImage {
         let pixel = |i: usize| [(i * 4) as u8, (i * 2 + index * 8) as u8, 0, if i % 8 < 3 { 40 } else { 220 }];
         let pixels = DisplayPixels::Eight((0..64).map(pixel).collect());
-        DisplayImage { width: 16, height: 4, opaque: false, alpha: AlphaConvention::Linear, pixels }
+        DisplayImage {
+            width: 16,
+            height: 4,
+            opaque: false,
+            alpha: AlphaConvention::Linear,
+            encoding: DisplayEncoding::Srgb,
+            pixels,
+        }
     }
 
     fn film(frames: usize, fps: [u32; 2], transparent: bool) -> Vec<u8> {

@@ -5,4 +5,3 @@ pub mod ffmpeg;
 pub(crate) mod gif;
 pub(crate) mod ordered;
 mod palette;
-pub(crate) mod timing;

@@ -25,10 +25,10 @@ pub(crate) struct ReorderBuffer<F: FilmEncoder> {
     path: PathBuf,
     frame_count: usize,
     window: usize,
-    state: Mutex<State<F>>,
+    state: Mutex<ReorderState<F>>,
 }
 
-struct State<F: FilmEncoder> {
+struct ReorderState<F: FilmEncoder> {
     /// `None` after an error.
     film: Option<F>,
     next: usize,
@@ -37,7 +37,7 @@ struct State<F: FilmEncoder> {
 
 impl<F: FilmEncoder> ReorderBuffer<F> {
     pub(crate) fn new(film: F, path: PathBuf, frame_count: usize, window: usize) -> Self {
-        let state = Mutex::new(State { film: Some(film), next: 0, waiting: BTreeMap::new() });
+        let state = Mutex::new(ReorderState { film: Some(film), next: 0, waiting: BTreeMap::new() });
         Self { path, frame_count, window: window.max(1), state }
     }
 
@@ -49,6 +49,7 @@ impl<F: FilmEncoder> ReorderBuffer<F> {
         let Some(film) = &mut state.film else {
             return Err(MediaError::AlreadyFailed { path: self.path.clone() });
         };
+        // Frames that wait are in memory, which the window bounds.
         let end = self.frame_count.min(state.next + self.window);
         if !(state.next..end).contains(&index) || state.waiting.contains_key(&index) {
             return Err(MediaError::OutOfOrder {
@@ -60,6 +61,7 @@ impl<F: FilmEncoder> ReorderBuffer<F> {
         }
         state.waiting.insert(index, encoded);
         while let Some(encoded) = state.waiting.remove(&state.next) {
+            // A film with a gap is of no use: it is dropped at once, with its temporary file.
             if let Err(error) = film.append(encoded) {
                 state.film = None;
                 state.waiting.clear();

@@ -71,20 +71,20 @@ impl Histogram {
     }
 
     fn colors(&self) -> Vec<WeightedColor> {
-        let occupied = self.0.iter().enumerate().filter(|(_, bin)| bin.count > 0);
-        // Weighted by the square root of the count: a bright core of few pixels must not lose to the many pixels of the
-        // glow around it.
-        let weighted = |(index, bin): (usize, &Bin<u64>)| WeightedColor {
-            color: bin.mean(index),
-            weight: (bin.count as f64).sqrt() as f32,
-        };
-        occupied.map(weighted).collect()
+        let mut colors = Vec::new();
+        for (index, bin) in self.0.iter().enumerate().filter(|(_, bin)| bin.count > 0) {
+            // Weighted by the square root of the count: a bright core of few pixels must not lose to the many pixels of the
+            // glow around it.
+            colors.push(WeightedColor { color: bin.mean(index), weight: (bin.count as f64).sqrt() as f32 });
+        }
+        colors
     }
 }
 
-fn histogram_bin([r, g, b]: [u8; 3]) -> usize {
-    let quantized = |channel: u8| usize::from(channel) >> (8 - BITS);
-    (quantized(r) << (2 * BITS)) | (quantized(g) << BITS) | quantized(b)
+/// The index of a color's bin: the highest bits of red, green and blue.
+fn histogram_bin(color: [u8; 3]) -> usize {
+    let [r, g, b] = color.map(|code| usize::from(code) >> (8 - BITS));
+    (r << (2 * BITS)) | (g << BITS) | b
 }
 
 /// The lowest code of a channel in the bin with this index.
@@ -112,19 +112,24 @@ struct ColorBox {
 impl ColorBox {
     fn new(colors: Vec<WeightedColor>) -> Self {
         let total: f32 = colors.iter().map(|entry| entry.weight).sum();
-        let along = |axis: usize| {
+        let mut widest = Self { colors: Vec::new(), axis: 0, mean: 0.0, spread: f32::NEG_INFINITY };
+        for axis in 0..3 {
             let sum: f32 = colors.iter().map(|entry| entry.weight * entry.color[axis]).sum();
             let mean = sum / total.max(f32::MIN_POSITIVE);
-            let square = |entry: &WeightedColor| entry.weight * (entry.color[axis] - mean) * (entry.color[axis] - mean);
-            (axis, mean, CHANNEL_WEIGHTS[axis] * colors.iter().map(square).sum::<f32>())
-        };
-        let [a, b, c] = [0, 1, 2].map(along);
-        let (axis, mean, spread) = [b, c].into_iter().fold(a, |best, next| if next.2 > best.2 { next } else { best });
-        Self { colors, axis, mean, spread }
+            let deviations =
+                colors.iter().map(|entry| entry.weight * (entry.color[axis] - mean) * (entry.color[axis] - mean));
+            let spread = CHANNEL_WEIGHTS[axis] * deviations.sum::<f32>();
+            // Of equal axes the first.
+            if spread > widest.spread {
+                widest = Self { colors: Vec::new(), axis, mean, spread };
+            }
+        }
+        Self { colors, ..widest }
     }
 
     fn split(self) -> [Self; 2] {
         let (axis, mean) = (self.axis, self.mean);
+        // At the mean rather than the median: one bright color beside many dark ones gets a box of its own.
         let (low, high) = self.colors.into_iter().partition(|entry| entry.color[axis] <= mean);
         [Self::new(low), Self::new(high)]
     }
@@ -136,8 +141,10 @@ impl ColorBox {
 
 fn mean(colors: &[WeightedColor]) -> Option<[f32; 3]> {
     let total: f32 = colors.iter().map(|entry| entry.weight).sum();
-    let along = |axis: usize| colors.iter().map(|entry| entry.weight * entry.color[axis]).sum::<f32>() / total;
-    (total > 0.0).then(|| [0, 1, 2].map(along))
+    if total <= 0.0 {
+        return None;
+    }
+    Some([0, 1, 2].map(|axis| colors.iter().map(|entry| entry.weight * entry.color[axis]).sum::<f32>() / total))
 }
 
 /// Up to `size` palette entries for all counted colors; at least one.
@@ -147,6 +154,7 @@ pub(crate) fn palette(histogram: &Histogram, size: usize) -> Vec<[u8; 3]> {
     while boxes.len() < size {
         let widest =
             (0..boxes.len()).fold(0, |best, next| if boxes[next].spread > boxes[best].spread { next } else { best });
+        // Each box is a single color.
         if boxes[widest].spread <= 0.0 {
             break;
         }
@@ -220,14 +228,15 @@ impl Ditherer {
     /// Finds the dither pair for every counted color. `palette` has 1 to 256 entries.
     pub(crate) fn new(palette: &[[u8; 3]], histogram: &Histogram) -> Self {
         let entries: Vec<[f32; 3]> = palette.iter().take(256).map(|color| color.map(f32::from)).collect();
-        let counts = histogram.0.par_iter().enumerate().with_min_len(1024);
-        let pair_of = |(index, bin): (usize, &Bin<u64>)| {
+        let bins = histogram.0.par_iter().enumerate().with_min_len(1024);
+        let pairs = bins.map(|(index, bin)| {
+            // Most bins: a film has colors in few of them, and no other is looked up.
             if bin.count == 0 {
                 return [EntryPair::default(); 8];
             }
             std::array::from_fn(|octant| pair(octant_center(index, octant), &entries))
-        };
-        let pairs = counts.map(pair_of).collect();
+        });
+        let pairs = pairs.collect();
         Self { entries, pairs }
     }
 

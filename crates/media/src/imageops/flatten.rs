@@ -2,7 +2,7 @@
 
 use bansho_base::{
     color::{AlphaConvention, decode_srgb, decode_srgb8, encode_srgb},
-    frame::{DisplayImage, DisplayPixels},
+    frame::{DisplayEncoding, DisplayImage, DisplayPixels},
 };
 
 /// `picture` over black, blended as its [`AlphaConvention`] says, so that it shows the light of the frame.
@@ -10,7 +10,9 @@ use bansho_base::{
 /// An opaque picture is returned unchanged. A view transform of a frame over black is a little more exact, since this function starts from
 /// rounded codes.
 pub fn over_black(picture: &DisplayImage) -> DisplayImage {
-    let pixels = match (&picture.pixels, picture.alpha) {
+    // Codes that are not sRGB-encoded are multiplied as they are.
+    let blended = if picture.encoding == DisplayEncoding::Srgb { picture.alpha } else { AlphaConvention::Encoded };
+    let pixels = match (&picture.pixels, blended) {
         (same, _) if picture.opaque => same.clone(),
         (DisplayPixels::Eight(pixels), AlphaConvention::Linear) => {
             DisplayPixels::Eight(pixels.iter().map(linear_eight).collect())
@@ -25,7 +27,14 @@ pub fn over_black(picture: &DisplayImage) -> DisplayImage {
             DisplayPixels::Sixteen(pixels.iter().map(|&[rgb @ .., a]| encoded_sixteen(rgb, a)).collect())
         }
     };
-    DisplayImage { width: picture.width, height: picture.height, opaque: true, alpha: picture.alpha, pixels }
+    DisplayImage {
+        width: picture.width,
+        height: picture.height,
+        opaque: true,
+        alpha: picture.alpha,
+        encoding: picture.encoding,
+        pixels,
+    }
 }
 
 /// Rounded product of codes and alpha.
@@ -42,6 +51,7 @@ fn encoded_sixteen(rgb: [u16; 3], alpha: u16) -> [u16; 4] {
 /// Product of linear light and alpha.
 fn linear_eight(&[r, g, b, alpha]: &[u8; 4]) -> [u8; 4] {
     let [r, g, b] = match alpha {
+        // Most pixels, without a conversion there and back.
         0 => [0; 3],
         255 => [r, g, b],
         _ => [r, g, b].map(|code| {
@@ -82,8 +92,14 @@ mod tests {
     #[test]
     fn light_is_multiplied_not_codes() {
         let pixels = DisplayPixels::Eight(vec![[255, 188, 0, 128], [9, 8, 7, 255], [9, 8, 7, 0]]);
-        let flat =
-            over_black(&DisplayImage { width: 3, height: 1, opaque: false, alpha: AlphaConvention::Linear, pixels });
+        let flat = over_black(&DisplayImage {
+            width: 3,
+            height: 1,
+            opaque: false,
+            alpha: AlphaConvention::Linear,
+            encoding: DisplayEncoding::Srgb,
+            pixels,
+        });
         // 128/255 of full light, 0.502, is code 188; code 188 is 0.503, of which 128/255 is 0.2524: code 137.6.
         assert_eq!(flat.pixels, DisplayPixels::Eight(vec![[188, 138, 0, 255], [9, 8, 7, 255], [0, 0, 0, 255]]));
         assert!(flat.opaque);
@@ -93,11 +109,36 @@ mod tests {
     fn codes_are_multiplied_where_they_are_what_is_blended() {
         let alpha = AlphaConvention::Encoded;
         let pixels = DisplayPixels::Eight(vec![[255, 188, 0, 128], [9, 8, 7, 255], [9, 8, 7, 0]]);
-        let flat = over_black(&DisplayImage { width: 3, height: 1, opaque: false, alpha, pixels });
+        let flat = over_black(&DisplayImage {
+            width: 3,
+            height: 1,
+            opaque: false,
+            alpha,
+            encoding: DisplayEncoding::Srgb,
+            pixels,
+        });
         assert_eq!(flat.pixels, DisplayPixels::Eight(vec![[128, 94, 0, 255], [9, 8, 7, 255], [0, 0, 0, 255]]));
         let pixels = DisplayPixels::Sixteen(vec![[65_535, 48_316, 0, 32_896]]);
-        let flat = over_black(&DisplayImage { width: 1, height: 1, opaque: false, alpha, pixels });
+        let flat = over_black(&DisplayImage {
+            width: 1,
+            height: 1,
+            opaque: false,
+            alpha,
+            encoding: DisplayEncoding::Srgb,
+            pixels,
+        });
         assert_eq!(flat.pixels, DisplayPixels::Sixteen(vec![[32_896, 24_253, 0, 65_535]]));
+    }
+
+    #[test]
+    fn linear_light_is_multiplied_as_it_is() {
+        let pixels = DisplayPixels::Eight(vec![[255, 188, 0, 128]]);
+        let (alpha, encoding) = (AlphaConvention::Linear, DisplayEncoding::LinearAcescg);
+        let flat = over_black(&DisplayImage { width: 1, height: 1, opaque: false, alpha, encoding, pixels });
+        assert_eq!(
+            (flat.pixels, flat.encoding),
+            (DisplayPixels::Eight(vec![[128, 94, 0, 255]]), DisplayEncoding::LinearAcescg)
+        );
     }
 
     #[test]
@@ -108,6 +149,7 @@ mod tests {
             height: 1,
             opaque: false,
             alpha: AlphaConvention::Linear,
+            encoding: DisplayEncoding::Srgb,
             pixels: wide,
         });
         let DisplayPixels::Sixteen(pixels) = &flat.pixels else { unreachable!() };

@@ -32,10 +32,13 @@ pub fn draw_number(picture: &mut DisplayImage, number: i64) {
     let Some(scale) = scale(dots, [picture.width, picture.height]) else { return };
     let width = picture.width;
     let size = dots.map(|dots| dots * scale);
-    let lit = |x: usize, y: usize| is_lit(&glyphs, x / scale, y / scale);
     match &mut picture.pixels {
-        DisplayPixels::Eight(pixels) => fill(pixels, width, size, [u8::MAX; 4], lit),
-        DisplayPixels::Sixteen(pixels) => fill(pixels, width, size, [u16::MAX; 4], lit),
+        DisplayPixels::Eight(pixels) => {
+            fill(pixels, width, size, [u8::MAX; 4], |x, y| is_lit(&glyphs, x / scale, y / scale));
+        }
+        DisplayPixels::Sixteen(pixels) => {
+            fill(pixels, width, size, [u16::MAX; 4], |x, y| is_lit(&glyphs, x / scale, y / scale));
+        }
     }
 }
 
@@ -47,6 +50,7 @@ fn dots(glyphs: &[usize]) -> [usize; 2] {
 /// Pixels for each dot.
 fn scale([columns, rows]: [usize; 2], [width, height]: [usize; 2]) -> Option<usize> {
     let max = (height / (8 * rows)).min(width / columns);
+    // A sixteenth of the height, rounded.
     let default = (height + 8 * rows) / (16 * rows);
     (max > 0).then(|| default.clamp(1, max))
 }
@@ -61,6 +65,7 @@ fn is_lit(glyphs: &[usize], column: usize, row: usize) -> bool {
     }
 }
 
+/// Draws the label: white where it is lit, else black.
 fn fill<T: Copy + Default>(
     pixels: &mut [[T; 4]],
     width: usize,
@@ -78,14 +83,20 @@ fn fill<T: Copy + Default>(
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::color::AlphaConvention;
+    use bansho_base::{color::AlphaConvention, frame::DisplayEncoding};
 
     use super::*;
 
     fn labeled(size: [usize; 2], shown: i64) -> DisplayImage {
         let pixels = DisplayPixels::Eight(vec![[9, 9, 9, 255]; size[0] * size[1]]);
-        let mut picture =
-            DisplayImage { width: size[0], height: size[1], opaque: true, alpha: AlphaConvention::Linear, pixels };
+        let mut picture = DisplayImage {
+            width: size[0],
+            height: size[1],
+            opaque: true,
+            alpha: AlphaConvention::Linear,
+            encoding: DisplayEncoding::Srgb,
+            pixels,
+        };
         draw_number(&mut picture, shown);
         picture
     }

@@ -53,8 +53,8 @@ impl SheetLayout {
 
     /// Width and height of the sheet, pixels.
     pub fn size(&self) -> [usize; 2] {
-        let along = |cells: usize, side: usize| cells * side + cells.saturating_sub(1) * self.gutter;
-        [along(self.columns, self.cell[0]), along(self.rows(), self.cell[1])]
+        let counts = [self.columns, self.rows()];
+        [0, 1].map(|axis| counts[axis] * self.cell[axis] + counts[axis].saturating_sub(1) * self.gutter)
     }
 
     /// The rectangle of the picture at position `index`.
@@ -79,6 +79,7 @@ impl SheetLayout {
     }
 }
 
+/// The layout of pictures of these sizes, which must be equal.
 fn layout(sizes: impl Iterator<Item = [usize; 2]>, columns: usize, gutter: usize) -> Result<SheetLayout, SheetError> {
     if columns == 0 {
         return Err(SheetError::NoColumns);
@@ -137,14 +138,15 @@ pub fn tile_display(
     } else {
         DisplayPixels::Sixteen(layout.copy_cells(&sixteen, fill.map(|code| u16::from(code) * 257)))
     };
+    // Without gutters and empty cells the fill does not show.
     let is_full = gutter == 0 && layout.count == layout.columns * layout.rows();
     let opaque = images.iter().all(|image| image.opaque) && (is_full || fill[3] == u8::MAX);
-    Ok(DisplayImage { width, height, opaque, alpha: images[0].alpha, pixels })
+    Ok(DisplayImage { width, height, opaque, alpha: images[0].alpha, encoding: images[0].encoding, pixels })
 }
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::color::AlphaConvention;
+    use bansho_base::{color::AlphaConvention, frame::DisplayEncoding};
 
     use super::*;
 
@@ -173,7 +175,14 @@ mod tests {
     fn a_sheet_is_opaque_only_if_all_of_it_is() {
         let image = |code: u8| {
             let pixels = DisplayPixels::Eight(vec![[code, 0, 0, 255]; 2]);
-            DisplayImage { width: 1, height: 2, opaque: true, alpha: AlphaConvention::Linear, pixels }
+            DisplayImage {
+                width: 1,
+                height: 2,
+                opaque: true,
+                alpha: AlphaConvention::Linear,
+                encoding: DisplayEncoding::Srgb,
+                pixels,
+            }
         };
         let images = [image(1), image(2), image(3)];
         let opaque = |columns, gutter, alpha| tile_display(&images, columns, gutter, [0, 0, 0, alpha]).unwrap().opaque;
@@ -191,7 +200,14 @@ mod tests {
             Err(SheetError::SizesDiffer { index: 1, width: 2, height: 1 })
         );
         let pixels = DisplayPixels::Eight(vec![[0; 4]]);
-        let eight = DisplayImage { width: 1, height: 1, opaque: true, alpha: AlphaConvention::Linear, pixels };
+        let eight = DisplayImage {
+            width: 1,
+            height: 1,
+            opaque: true,
+            alpha: AlphaConvention::Linear,
+            encoding: DisplayEncoding::Srgb,
+            pixels,
+        };
         let sixteen = DisplayImage { pixels: DisplayPixels::Sixteen(vec![[0; 4]]), ..eight };
         assert_eq!(tile_display(&[eight, sixteen], 1, 0, [0; 4]), Err(SheetError::BitDepthsDiffer { index: 1 }));
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bansho_base::{
     color::AlphaConvention,
-    frame::{DisplayImage, DisplayPixels, Frame},
+    frame::{DisplayEncoding, DisplayImage, DisplayPixels, Frame},
 };
 
 use crate::{
@@ -20,9 +20,9 @@ use crate::{
         ffmpeg::{self, FfmpegFilm, VideoContainer, VideoFormat, VideoOptions},
         gif::{self, GifFilm, GifFormat},
         ordered::{FilmEncoder, ReorderBuffer},
-        timing::GifTiming,
     },
     format::{OutputKind, PictureFormat},
+    frame_rate::GifTiming,
     png::{self, PngEffort},
 };
 
@@ -96,7 +96,7 @@ pub struct FrameSlot {
 
 /// A finished picture.
 #[derive(Clone, Copy, Debug)]
-pub enum Picture<'a> {
+pub enum FinishedPicture<'a> {
     /// Scene-linear, for EXR; carries its fingerprint in its header.
     Linear(&'a Frame),
     /// Display pixels, with the fingerprint of everything they depend on.
@@ -111,10 +111,10 @@ pub enum Picture<'a> {
 pub struct Sink {
     pattern: OutputPattern,
     options: SinkOptions,
-    target: Target,
+    target: SinkTarget,
 }
 
-enum Target {
+enum SinkTarget {
     Png,
     Exr,
     Apng(ReorderBuffer<ApngFilm>),
@@ -135,16 +135,16 @@ impl Sink {
             check_film(&path, &options)?;
         }
         let target = match kind {
-            OutputKind::Png => Target::Png,
-            OutputKind::Exr => Target::Exr,
+            OutputKind::Png => SinkTarget::Png,
+            OutputKind::Exr => SinkTarget::Exr,
             OutputKind::Apng => {
                 let film = ApngFilm::create(&path, apng_format(&options), &options.overwrite)?;
-                Target::Apng(in_order(film, &path, &options))
+                SinkTarget::Apng(in_order(film, &path, &options))
             }
             OutputKind::Gif => {
                 let format = gif_format(&path, &options)?;
                 let film = GifFilm::create(&path, format.clone(), &options.overwrite)?;
-                Target::Gif(in_order(film, &path, &options), format)
+                SinkTarget::Gif(in_order(film, &path, &options), format)
             }
             OutputKind::Mp4 => open_video(VideoContainer::Mp4, &path, &options)?,
             OutputKind::Mov => open_video(VideoContainer::Mov, &path, &options)?,
@@ -152,7 +152,7 @@ impl Sink {
         };
         if kind.is_sequence() {
             // Better to fail now than after the first frame has been rendered.
-            drop(AtomicFile::create(&path)?);
+            drop(AtomicFile::create(&path, &options.overwrite)?);
         }
         Ok(Self { pattern, options, target })
     }
@@ -176,32 +176,33 @@ impl Sink {
     ///
     /// # Errors
     /// The frame cannot be written or would replace a file that must stay, has the wrong pixel format or size, or is out of order.
-    pub fn write(&self, slot: FrameSlot, picture: Picture<'_>) -> Result<(), MediaError> {
+    pub fn write(&self, slot: FrameSlot, picture: FinishedPicture<'_>) -> Result<(), MediaError> {
         let path = self.path(slot.number);
         match (&self.target, picture) {
-            (Target::Exr, Picture::Linear(frame)) => {
-                atomic::write_bytes_with(&path, &exr::encode(frame, &path)?, &self.options.overwrite)
+            (SinkTarget::Exr, FinishedPicture::Linear(frame)) => {
+                atomic::write_bytes(&path, &exr::encode(frame, &path)?, &self.options.overwrite)
             }
-            (Target::Png, Picture::Display(image, fingerprint)) => {
+            (SinkTarget::Png, FinishedPicture::Display(image, fingerprint)) => {
                 let bytes = png::encode(image, fingerprint, self.options.png_effort, &path)?;
-                atomic::write_bytes_with(&path, &bytes, &self.options.overwrite)
+                atomic::write_bytes(&path, &bytes, &self.options.overwrite)
             }
-            (Target::Apng(film), Picture::Display(image, _)) => {
+            (SinkTarget::Apng(film), FinishedPicture::Display(image, _)) => {
                 self.check_frame(image, &path)?;
                 film.push(slot.index, apng::prepare(image, self.options.opaque, &path)?)
             }
-            (Target::Gif(film, format), Picture::Display(image, _)) => {
+            (SinkTarget::Gif(film, format), FinishedPicture::Display(image, _)) => {
                 self.check_frame(image, &path)?;
                 film.push(slot.index, gif::prepare(image, slot.index, format, &path)?)
             }
-            (Target::Video(film, format), Picture::Display(image, _)) => {
+            (SinkTarget::Video(film, format), FinishedPicture::Display(image, _)) => {
                 self.check_frame(image, &path)?;
                 film.push(slot.index, ffmpeg::prepare(image, format))
             }
-            (Target::Exr, Picture::Display(..))
-            | (Target::Png | Target::Apng(_) | Target::Gif(..) | Target::Video(..), Picture::Linear(_)) => {
-                Err(MediaError::WrongPicture { path, expected: self.picture_format() })
-            }
+            (SinkTarget::Exr, FinishedPicture::Display(..))
+            | (
+                SinkTarget::Png | SinkTarget::Apng(_) | SinkTarget::Gif(..) | SinkTarget::Video(..),
+                FinishedPicture::Linear(_),
+            ) => Err(MediaError::WrongPicture { path, expected: self.picture_format() }),
         }
     }
 
@@ -211,15 +212,18 @@ impl Sink {
     /// Frames are missing, an earlier frame failed, or the film cannot be written.
     pub fn finish(self) -> Result<(), MediaError> {
         match self.target {
-            Target::Png | Target::Exr => Ok(()),
-            Target::Apng(film) => film.finish(),
-            Target::Gif(film, _) => film.finish(),
-            Target::Video(film, _) => film.finish(),
+            SinkTarget::Png | SinkTarget::Exr => Ok(()),
+            SinkTarget::Apng(film) => film.finish(),
+            SinkTarget::Gif(film, _) => film.finish(),
+            SinkTarget::Video(film, _) => film.finish(),
         }
     }
 
-    /// Checks that a frame of a film has the size of the film.
+    /// Checks that a frame of a film has the size of the film, and colors that the film can name.
     fn check_frame(&self, image: &DisplayImage, path: &Path) -> Result<(), MediaError> {
+        if image.encoding != DisplayEncoding::Srgb && !self.kind().takes_linear_acescg() {
+            return Err(MediaError::NotSrgb { path: path.to_path_buf() });
+        }
         let [width, height] = self.options.size;
         if [image.width, image.height] != [width, height] {
             let (path, allowed) = (path.to_path_buf(), SizeRule::Exactly(width, height));
@@ -245,10 +249,10 @@ fn in_order<F: FilmEncoder>(film: F, path: &Path, options: &SinkOptions) -> Reor
     ReorderBuffer::new(film, path.to_path_buf(), options.frame_count, options.window)
 }
 
-fn open_video(container: VideoContainer, path: &Path, options: &SinkOptions) -> Result<Target, MediaError> {
+fn open_video(container: VideoContainer, path: &Path, options: &SinkOptions) -> Result<SinkTarget, MediaError> {
     let format = video_format(container, options);
     let film = FfmpegFilm::create(path, &format, &options.overwrite)?;
-    Ok(Target::Video(in_order(film, path, options), format))
+    Ok(SinkTarget::Video(in_order(film, path, options), format))
 }
 
 /// Largest side of a film, pixels.

@@ -5,7 +5,7 @@ pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
 /// One chunk of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Chunk<'a> {
+pub(crate) struct PngChunk<'a> {
     pub(crate) kind: [u8; 4],
     pub(crate) contents: &'a [u8],
 }
@@ -23,24 +23,26 @@ pub(crate) fn chunks(file: &[u8]) -> Option<Chunks<'_>> {
 }
 
 impl<'a> Iterator for Chunks<'a> {
-    type Item = Result<Chunk<'a>, BrokenChunk>;
+    type Item = Result<PngChunk<'a>, BrokenChunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.0.is_empty() {
             return None;
         }
         let chunk = split(self.0);
+        // Nothing is read beyond damage: the length of a damaged chunk cannot be trusted.
         self.0 = chunk.map_or(&[], |(_, rest)| rest);
         Some(chunk.map(|(chunk, _)| chunk).ok_or(BrokenChunk))
     }
 }
 
-fn split(bytes: &[u8]) -> Option<(Chunk<'_>, &[u8])> {
+/// The first chunk and what follows it; `None` if it is truncated or damaged.
+fn split(bytes: &[u8]) -> Option<(PngChunk<'_>, &[u8])> {
     let (length, bytes) = bytes.split_first_chunk::<4>()?;
     let (kind, bytes) = bytes.split_first_chunk::<4>()?;
     let (contents, bytes) = bytes.split_at_checked(u32::from_be_bytes(*length) as usize)?;
     let (checksum, rest) = bytes.split_first_chunk::<4>()?;
-    let chunk = Chunk { kind: *kind, contents };
+    let chunk = PngChunk { kind: *kind, contents };
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(kind);
     hasher.update(contents);
@@ -68,8 +70,8 @@ mod tests {
         push(&mut file, *b"tEXt", &[b"a", b"", b"bc"]);
         push(&mut file, *b"IEND", &[]);
         let read: Vec<_> = chunks(&file).unwrap().collect::<Result<_, _>>().unwrap();
-        assert_eq!(read[0], Chunk { kind: *b"tEXt", contents: b"abc" });
-        assert_eq!(read[1], Chunk { kind: *b"IEND", contents: b"" });
+        assert_eq!(read[0], PngChunk { kind: *b"tEXt", contents: b"abc" });
+        assert_eq!(read[1], PngChunk { kind: *b"IEND", contents: b"" });
         for cut in 9..file.len() {
             if cut != file.len() - 12 {
                 assert!(chunks(&file[..cut]).unwrap().any(|chunk| chunk.is_err()), "cut at {cut}");

@@ -6,10 +6,11 @@ use ::png::{
     BitDepth, ColorType, DeflateCompression, Encoder, EncodingError, Filter, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent,
 };
-use bansho_base::frame::{DisplayImage, DisplayPixels};
+use bansho_base::frame::{DisplayEncoding, DisplayImage, DisplayPixels};
 
-use super::{KEY_ALPHA, KEY_FINGERPRINT, KEY_VERSION};
+use super::{KEY_ALPHA, KEY_ENCODING, KEY_FINGERPRINT, KEY_VERSION};
 use crate::{
+    decode::color::primaries::AP1,
     error::{MediaError, SizeRule},
     fingerprint,
 };
@@ -24,7 +25,7 @@ pub enum PngEffort {
     Small,
 }
 
-/// The bytes of a PNG of `picture`: with its 8 or 16 bits, without alpha if it is opaque, marked as sRGB, with the fingerprint and the
+/// The bytes of a PNG of `picture`: with its 8 or 16 bits, without alpha if it is opaque, marked as what its codes stand for, with the fingerprint and the
 /// convention of alpha as text. The same picture gives the same bytes.
 ///
 /// # Errors
@@ -36,7 +37,7 @@ pub fn encode(
     path: &Path,
 ) -> Result<Vec<u8>, MediaError> {
     let size = checked_size(picture, path)?;
-    compress(picture, size, Some(fingerprint), effort, Transfer::Srgb)
+    compress(picture, size, Some(fingerprint), effort, ColorMark::of(picture.encoding))
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
@@ -45,7 +46,7 @@ pub fn encode(
 /// # Errors
 /// As [`encode`].
 pub fn encode_document(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
-    document(picture, path, Transfer::Srgb)
+    document(picture, path, ColorMark::of(picture.encoding))
 }
 
 /// As [`encode_document`], of linear values: the file says so.
@@ -53,19 +54,19 @@ pub fn encode_document(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, M
 /// # Errors
 /// As [`encode`].
 pub fn encode_linear_document(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
-    document(picture, path, Transfer::Linear)
+    document(picture, path, ColorMark::Linear)
 }
 
-fn document(picture: &DisplayImage, path: &Path, transfer: Transfer) -> Result<Vec<u8>, MediaError> {
+fn document(picture: &DisplayImage, path: &Path, mark: ColorMark) -> Result<Vec<u8>, MediaError> {
     let size = checked_size(picture, path)?;
-    compress(picture, size, None, PngEffort::Small, transfer)
+    compress(picture, size, None, PngEffort::Small, mark)
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
 /// As [`encode`], without a fingerprint: a frame of a film.
 pub(crate) fn encode_frame(picture: &DisplayImage, path: &Path) -> Result<Vec<u8>, MediaError> {
     let size = checked_size(picture, path)?;
-    compress(picture, size, None, PngEffort::Fast, Transfer::Srgb)
+    compress(picture, size, None, PngEffort::Fast, ColorMark::of(picture.encoding))
         .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
 }
 
@@ -90,19 +91,36 @@ fn checked_size(picture: &DisplayImage, path: &Path) -> Result<[u32; 2], MediaEr
     Ok([width as u32, height as u32])
 }
 
-/// How codes encode light, or any other quantity.
+/// What the chunks of a file say about its colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Transfer {
+enum ColorMark {
+    /// sRGB, gAMA and cHRM.
     Srgb,
+    /// gAMA 1 alone.
     Linear,
+    /// gAMA 1, and cHRM of AP1.
+    LinearAcescg,
+    /// Nothing: whoever converts by gAMA, as several game engines do on import, must leave the codes as they are.
+    Data,
 }
 
+impl ColorMark {
+    fn of(encoding: DisplayEncoding) -> Self {
+        match encoding {
+            DisplayEncoding::Srgb => Self::Srgb,
+            DisplayEncoding::LinearAcescg => Self::LinearAcescg,
+            DisplayEncoding::Data => Self::Data,
+        }
+    }
+}
+
+/// The file, of a picture whose size is checked.
 fn compress(
     picture: &DisplayImage,
     [width, height]: [u32; 2],
     fingerprint: Option<&[u8; 32]>,
     effort: PngEffort,
-    transfer: Transfer,
+    mark: ColorMark,
 ) -> Result<Vec<u8>, EncodingError> {
     let mut file = Vec::with_capacity(picture.width * picture.height / 2 + 1024);
     let mut encoder = Encoder::new(&mut file, width, height);
@@ -111,14 +129,19 @@ fn compress(
         DisplayPixels::Eight(_) => BitDepth::Eight,
         DisplayPixels::Sixteen(_) => BitDepth::Sixteen,
     });
-    match transfer {
-        Transfer::Srgb => mark_srgb(&mut encoder),
-        Transfer::Linear => encoder.set_source_gamma(ScaledFloat::from_scaled(100_000)),
+    match mark {
+        ColorMark::Srgb => mark_srgb(&mut encoder),
+        ColorMark::Linear => encoder.set_source_gamma(ScaledFloat::from_scaled(LINEAR_GAMMA)),
+        ColorMark::LinearAcescg => mark_linear_acescg(&mut encoder),
+        ColorMark::Data => {}
     }
     encoder.add_text_chunk("Software".to_owned(), format!("Bansho {}", fingerprint::VERSION))?;
     encoder.add_text_chunk(KEY_VERSION.to_owned(), fingerprint::VERSION.to_owned())?;
     if let Some(fingerprint) = fingerprint {
         encoder.add_text_chunk(KEY_FINGERPRINT.to_owned(), fingerprint::to_hex(fingerprint))?;
+    }
+    if let Some(name) = encoding_name(picture.encoding) {
+        encoder.add_text_chunk(KEY_ENCODING.to_owned(), name.to_owned())?;
     }
     if !picture.opaque {
         encoder.add_text_chunk(KEY_ALPHA.to_owned(), picture.alpha.name().to_owned())?;
@@ -136,6 +159,32 @@ fn mark_srgb<W: std::io::Write>(encoder: &mut Encoder<'_, W>) {
     encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
     let (white, red, green, blue) = ((0.3127, 0.3290), (0.64, 0.33), (0.30, 0.60), (0.15, 0.06));
     encoder.set_source_chromaticities(SourceChromaticities::new(white, red, green, blue));
+}
+
+/// gAMA of linear values, in hundred-thousandths.
+const LINEAR_GAMMA: u32 = 100_000;
+
+/// Declares linear light with the primaries and the white of ACEScg. There is no sRGB chunk, before which gAMA and cHRM would not count, and cICP has no
+/// number for AP1.
+fn mark_linear_acescg<W: std::io::Write>(encoder: &mut Encoder<'_, W>) {
+    encoder.set_source_gamma(ScaledFloat::from_scaled(LINEAR_GAMMA));
+    let [red, green, blue, white] = AP1.map(|[x, y]| (x, y));
+    encoder.set_source_chromaticities(SourceChromaticities::new(white, red, green, blue));
+}
+
+/// The name of an encoding in the text of a file; sRGB needs none.
+fn encoding_name(encoding: DisplayEncoding) -> Option<&'static str> {
+    match encoding {
+        DisplayEncoding::Srgb => None,
+        DisplayEncoding::LinearAcescg => Some("lin_ap1_scene"),
+        DisplayEncoding::Data => Some("data"),
+    }
+}
+
+/// The encoding of this name in the text of a file; sRGB without one.
+pub(crate) fn encoding_of_name(name: Option<&str>) -> DisplayEncoding {
+    let named = [DisplayEncoding::LinearAcescg, DisplayEncoding::Data];
+    named.into_iter().find(|encoding| name.is_some() && encoding_name(*encoding) == name).unwrap_or_default()
 }
 
 pub(super) fn set_effort<W: std::io::Write>(encoder: &mut Encoder<'_, W>, effort: PngEffort) {
@@ -163,8 +212,7 @@ fn samples(picture: &DisplayImage) -> Cow<'_, [u8]> {
             Cow::Owned(rgba.into_flattened().into_flattened())
         }
         (DisplayPixels::Sixteen(pixels), true) => {
-            let rgb = |&[r, g, b, _]: &[u16; 4]| [r, g, b].map(u16::to_be_bytes);
-            let rgb: Vec<[[u8; 2]; 3]> = pixels.iter().map(rgb).collect();
+            let rgb: Vec<[[u8; 2]; 3]> = pixels.iter().map(|&[r, g, b, _]| [r, g, b].map(u16::to_be_bytes)).collect();
             Cow::Owned(rgb.into_flattened().into_flattened())
         }
     }
@@ -205,7 +253,14 @@ mod tests {
         let pixels: Vec<[u16; 4]> = (0..6).map(|i| [i, 257 * i, 65535 - i, 40000]).collect();
         for opaque in [false, true] {
             let pixels = DisplayPixels::Sixteen(pixels.clone());
-            let picture = DisplayImage { width: 3, height: 2, opaque, alpha: AlphaConvention::Linear, pixels };
+            let picture = DisplayImage {
+                width: 3,
+                height: 2,
+                opaque,
+                alpha: AlphaConvention::Linear,
+                encoding: DisplayEncoding::Srgb,
+                pixels,
+            };
             let (info, bytes) = read_back(&encode(&picture, &[1; 32], PngEffort::Fast, Path::new("a.png")).unwrap());
             assert_eq!(info.bit_depth, BitDepth::Sixteen);
             let values: Vec<u16> = bytes.as_chunks().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
@@ -227,6 +282,30 @@ mod tests {
         assert_eq!(gamma, Some(ScaledFloat::from_scaled(100_000)));
         assert!(!kinds(&linear).contains(b"sRGB") && kinds(&srgb).contains(b"sRGB"));
         assert_eq!(read_back(&linear).1, read_back(&srgb).1);
+    }
+
+    #[test]
+    fn raw_light_reads_back_as_the_light_it_is_and_data_claim_no_color() {
+        use bansho_base::host::assets::{Encoding, PictureLayers};
+        let read = |encoding| {
+            let pixels = DisplayPixels::Sixteen(vec![[20_690, 100, 65_535, 65_535]; 2]);
+            let alpha = AlphaConvention::Linear;
+            let picture = DisplayImage { width: 2, height: 1, opaque: true, alpha, encoding, pixels };
+            let file = encode(&picture, &[1; 32], PngEffort::Fast, Path::new("a.png")).unwrap();
+            let kinds: Vec<_> = super::super::chunk::chunks(&file).unwrap().map(|chunk| chunk.unwrap().kind).collect();
+            let limit = crate::limits::MemoryLimit::default();
+            (kinds, crate::assets::decode_picture(&file, "png", &PictureLayers::default(), limit).unwrap())
+        };
+        let (kinds, raw) = read(DisplayEncoding::LinearAcescg);
+        assert!(kinds.contains(b"gAMA") && kinds.contains(b"cHRM") && !kinds.contains(b"sRGB"), "{kinds:?}");
+        assert_eq!((raw.encoding, raw.remarks.len()), (Encoding::LinearAcescg, 0));
+        for (value, code) in raw.color.at(0, 0).into_iter().zip([20_690.0, 100.0, 65_535.0, 65_535.0]) {
+            assert!((value - code / 65_535.0).abs() < 1e-7, "{value}");
+        }
+        let (kinds, _) = read(DisplayEncoding::Data);
+        assert!([b"sRGB", b"gAMA", b"cHRM", b"iCCP", b"cICP"].iter().all(|kind| !kinds.contains(kind)), "{kinds:?}");
+        let (kinds, display) = read(DisplayEncoding::Srgb);
+        assert!(kinds.contains(b"sRGB") && display.encoding == Encoding::DisplaySrgb);
     }
 
     #[test]

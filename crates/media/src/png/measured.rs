@@ -36,13 +36,12 @@ impl MeasuredImage {
     /// Codes of `values`, which must not be negative, scaled so that the largest gets the largest code: 255, or 65535 with `sixteen_bits`.
     pub fn from_values(size: [usize; 2], channels: usize, values: &[f32], sixteen_bits: bool) -> Self {
         let scale = values.iter().fold(0.0_f32, |largest, &value| largest.max(value));
-        let codes_per_unit = |largest_code: u16| if scale > 0.0 { f32::from(largest_code) / scale } else { 0.0 };
+        let largest_code = if sixteen_bits { u16::MAX } else { u8::MAX.into() };
+        let codes_per_unit = if scale > 0.0 { f32::from(largest_code) / scale } else { 0.0 };
         let samples = if sixteen_bits {
-            let factor = codes_per_unit(u16::MAX);
-            Samples::Sixteen(values.iter().map(|value| (value * factor + 0.5) as u16).collect())
+            Samples::Sixteen(values.iter().map(|value| (value * codes_per_unit + 0.5) as u16).collect())
         } else {
-            let factor = codes_per_unit(u8::MAX.into());
-            Samples::Eight(values.iter().map(|value| (value * factor + 0.5) as u8).collect())
+            Samples::Eight(values.iter().map(|value| (value * codes_per_unit + 0.5) as u8).collect())
         };
         Self { size, channels, samples, scale }
     }

@@ -44,6 +44,40 @@ fn what_is_wrong_with_a_file_is_said_with_its_path() {
 }
 
 #[test]
+fn negative_frames_are_numbered_as_by_printf_and_as_formerly() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, width) in
+        [("n.-003.png", 3), ("n.-0002.png", 2), ("n.0000.png", 5), ("n.-001.png", 4), ("n.-0001.png", 9)]
+    {
+        fs::write(folder.path().join(name), png_bytes(&display(width, 2))).unwrap();
+    }
+    let assets = FileAssets::new(folder.path());
+    let width = |frame| assets.picture("n.####.png", frame).unwrap().color.width();
+    assert_eq!([-3, -2, 0, -1].map(width), [3, 2, 5, 4]);
+    assert!(assets.picture("n.####.png", -4).unwrap_err().path.ends_with("n.-004.png"));
+}
+
+#[test]
+fn a_missing_sequence_in_the_way_of_another_program_is_told_how_it_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let assets = FileAssets::new(folder.path());
+    for (name, own) in [("p.%04d.png", "####"), ("p.$F4.exr", "####"), ("p.@@@.png", "###"), ("p.<frame>.png", "####")]
+    {
+        let hint = format!("no such file; `{own}` stands for the frame number, not `{}`", &name[2..name.len() - 4]);
+        assert_eq!(assets.picture(name, 1).unwrap_err().problem.to_string(), hint);
+        assert_eq!(assets.find(name, 1).unwrap_err().problem.to_string(), hint);
+        assert_eq!(assets.digest(name, 1).unwrap_err().problem.to_string(), hint);
+    }
+    assert_eq!(
+        assets.depth("d.%d.pfm", 1, None).unwrap_err().problem.to_string(),
+        "no such file; `#` stands for the frame number, not `%d`"
+    );
+    // A file of that very name is one.
+    fs::write(folder.path().join("p.%04d.png"), png_bytes(&display(3, 2))).unwrap();
+    assert_eq!(assets.picture("p.%04d.png", 1).unwrap().color.width(), 3);
+}
+
+#[test]
 fn a_name_with_a_number_sign_is_a_name_if_that_file_exists() {
     let folder = tempfile::tempdir().unwrap();
     for (name, width) in [("take#2.png", 3), ("take72.png", 5), ("shot7.png", 7)] {
@@ -123,7 +157,13 @@ fn the_digest_of_a_mesh_is_that_of_its_buffers_too() {
     assert_ne!(digest().unwrap(), before);
     assert_eq!(assets.files("a.gltf", 0).unwrap(), ["a.gltf", "a.bin"].map(|name| folder.path().join(name)));
     fs::remove_file(folder.path().join("a.bin")).unwrap();
-    assert!(digest().is_err());
+    // What is missing is named, not the file that names it.
+    let missing = folder.path().join("a.bin").display().to_string();
+    assert_eq!(digest().unwrap_err().to_string(), format!("{missing}: no such file"));
+    assert_eq!(assets.mesh("a.gltf").unwrap_err().to_string(), format!("{missing}: no such file"));
+    fs::create_dir(folder.path().join("a.bin")).unwrap();
+    assert!(assets.mesh("a.gltf").unwrap_err().to_string().starts_with(&format!("{missing}: is a folder")));
+    fs::remove_dir(folder.path().join("a.bin")).unwrap();
     // A damaged file names no buffers.
     write("a.gltf", "{");
     assert_eq!(assets.files("a.gltf", 0).unwrap().len(), 1);

@@ -7,13 +7,13 @@ use std::{fs, path::Path};
 use bansho_base::{
     camera::CameraHeader,
     color::AlphaConvention,
-    frame::{Channel, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
+    frame::{Channel, DisplayEncoding, DisplayImage, DisplayPixels, Frame, FrameHeader, Precision},
     host::assets::{AssetProblem, Encoding, Picture, PictureAlpha, PictureLayers, PictureRemark},
     image::{Image, Rect},
 };
 use bansho_media::{
-    assets::{self, limits::MemoryLimit},
-    exr,
+    assets, exr,
+    limits::MemoryLimit,
     png::{self, PngEffort},
 };
 
@@ -23,7 +23,14 @@ fn decode_picture(bytes: &[u8], extension: &str) -> Result<Picture, AssetProblem
 
 fn display(width: usize, height: usize) -> DisplayImage {
     let pixels = (0..width * height).map(|i| [(i * 5) as u8, (i * 3) as u8, 200, 255 - (i % 7) as u8]).collect();
-    DisplayImage { width, height, opaque: false, alpha: AlphaConvention::Linear, pixels: DisplayPixels::Eight(pixels) }
+    DisplayImage {
+        width,
+        height,
+        opaque: false,
+        alpha: AlphaConvention::Linear,
+        encoding: DisplayEncoding::Srgb,
+        pixels: DisplayPixels::Eight(pixels),
+    }
 }
 
 fn frame(width: usize, height: usize) -> Frame {

@@ -10,9 +10,9 @@ pub mod texture;
 use bansho_base::{
     camera::upright_quad::{UprightQuad, right_facing},
     math::{
-        DVec2, DVec3, MulAdd,
+        DVec2, DVec3,
         random::{Key, Purpose},
-        simd::LANES,
+        simd::{LANES, Real},
     },
 };
 use fearless_simd::dispatch;
@@ -20,10 +20,10 @@ use stochastic_simplification::StochasticSimplification;
 
 use crate::{
     drops::{
-        lattice::{CELL_SIZE, Cell},
-        shutter_state::{DropClassState, Sphere, VisibleCell},
+        lattice::{CELL_SIZE, LatticeCell},
+        shutter_state::{DropClassState, DropState, Sphere, VisibleCell},
     },
-    lanes::{Lanes, ZERO_LANES, fast_max, fast_min},
+    lanes::{LaneArray, ZERO_LANES},
     streaks::{
         bin::{StreakChunk, StreakChunkBuilder},
         cell_drops::{DropBatch, FADE_IN},
@@ -40,7 +40,7 @@ const BILLBOARD_RADIUS: f64 = 0.75;
 const VARIANTS: usize = 2;
 
 /// Positions of a texture's drops, across and up, 0 to 1, sixteen at a time.
-type DropTexture = Vec<[Lanes; 2]>;
+type DropTexture = Vec<[LaneArray; 2]>;
 
 /// The textures of all diameters at one rain rate.
 struct DropTextures(Vec<[DropTexture; VARIANTS]>);
@@ -67,6 +67,8 @@ struct Billboard<'a> {
     quad: UprightQuad,
     /// m/s.
     velocity: DVec3,
+    /// Bends of the paths of its drops; `None` for uniform motion.
+    bends: Option<[DVec2; 2]>,
     texture: &'a DropTexture,
     /// Texture coordinates of its corner.
     offset: [f32; 2],
@@ -80,7 +82,7 @@ struct Billboard<'a> {
 /// drop, which that fraction of all billboards shows completely and the others do not, with a short fade.
 #[inline(always)]
 fn drop_visibility(remaining_count: f32, threshold: f32) -> f32 {
-    fast_min(1.0, fast_max(0.0, (remaining_count - threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32))
+    ((remaining_count - threshold * (1.0 - FADE_IN) as f32) * (1.0 / FADE_IN) as f32).simd_clamp01()
 }
 
 /// Wraps a texture coordinate into 0..1.
@@ -142,6 +144,7 @@ impl<'a> Billboards<'a> {
             0.0
         };
         let velocity = billboard.velocity.as_vec3().to_array();
+        let bends = billboard.bends.map(|ends| ends.map(|bend| [[bend.x as f32; LANES], [bend.y as f32; LANES]]));
         let diameter_mm = class.diameter_mm as f32;
         let opacity_factor = self.projection.shutter_state.opacity_factor(class.diameter_mm, class.speed);
         let opacity_factor = (opacity_factor / fraction) as f32;
@@ -152,6 +155,7 @@ impl<'a> Billboards<'a> {
             let mut drops = DropBatch {
                 positions: [ZERO_LANES; 3],
                 velocities: velocity.map(|v| [v; LANES]),
+                bends,
                 diameter_mm,
                 opacity_factor,
                 presence: ZERO_LANES,
@@ -191,20 +195,22 @@ impl<'a> Billboards<'a> {
     fn billboard(
         &self,
         class: &DropClassState,
-        cell: Cell,
+        cell: LatticeCell,
         contents: u64,
         [x, z, threshold, _]: [f32; 4],
     ) -> Billboard<'_> {
         let shutter_state = self.projection.shutter_state;
         let [across, up, choice, mirrored] = shutter_state.key.uniforms(contents, 0, class.purpose(OFFSET));
         // At a random position within the cell, so that billboards do not line up.
-        let (middle, velocity) = shutter_state.drop_state(class, cell, DVec3::new(x.into(), 0.5, z.into()));
+        let DropState { position: middle, velocity, bends } =
+            shutter_state.drop_state(class, cell, DVec3::new(x.into(), 0.5, z.into()));
         let height = class.lattice.height();
         let base = middle - DVec3::Y * (0.5 * height);
         let right = right_facing(shutter_state.cameras.middle(), base);
         Billboard {
             quad: UprightQuad::new(base, right, DVec2::new(CELL_SIZE, height), 0.0),
             velocity,
+            bends,
             texture: &self.textures.0[class.index][(choice * VARIANTS as f32) as usize],
             offset: [across, up],
             mirror: if mirrored < 0.5 { 1.0 } else { -1.0 },

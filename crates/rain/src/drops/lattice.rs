@@ -17,7 +17,7 @@ pub(crate) const CELL_SIZE: f64 = 1.0;
 
 /// Lattice index of a cell: x, y (upward from the ground at time 0) and z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Cell(pub(crate) [i64; 3]);
+pub(crate) struct LatticeCell(pub(crate) [i64; 3]);
 
 /// How the drops of a lattice fall and drift.
 #[derive(Clone, Copy, Debug)]
@@ -106,7 +106,7 @@ impl Lattice {
     }
 
     /// World position of a point of a cell, given as fractions of its edges, m.
-    pub(crate) fn point_in_world(&self, Cell([x, row, z]): Cell, fraction: DVec3) -> DVec3 {
+    pub(crate) fn point_in_world(&self, LatticeCell([x, row, z]): LatticeCell, fraction: DVec3) -> DVec3 {
         let horizontal = DVec2::new(x as f64 + fraction.x, z as f64 + fraction.z) * CELL_SIZE + self.drift(row);
         DVec3::new(horizontal.x, (row as f64 + fraction.y) * self.height + self.base, horizontal.y)
     }
@@ -120,7 +120,7 @@ impl Lattice {
 
     /// Random key of a cell's contents: equal for cells that a loop repeats. It packs 21, 22 and 21 bits of the three
     /// indices.
-    pub(crate) fn contents(&self, cell: Cell) -> u64 {
+    pub(crate) fn contents(&self, cell: LatticeCell) -> u64 {
         let [x, y, z] = cell.0;
         let y = self.rows.map_or(y, |rows| y.rem_euclid(rows));
         let bits = |count: i64, bits: u32| count as u64 & ((1 << bits) - 1);
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn a_drop_falls_at_its_speed_and_drifts_with_the_wind() {
         let wind = wind([3.0, 0.0, -1.0], None);
-        let (cell, fraction) = (Cell([4, 620, -2]), DVec3::new(0.3, 0.7, 0.8));
+        let (cell, fraction) = (LatticeCell([4, 620, -2]), DVec3::new(0.3, 0.7, 0.8));
         let at = |t: f64| lattice(6.0, &wind, None, t).point_in_world(cell, fraction);
         let displacement = at(100.5) - at(100.0);
         assert!((displacement - DVec3::new(1.5, -3.0, -0.5)).length() < 1e-9, "{displacement}");
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn a_drop_drifts_by_the_integral_of_a_keyed_wind() {
         let wind = wind(keyed(&[[0.0, 0.0], [4.0, 8.0]]), None);
-        let at = |t: f64| lattice(6.0, &wind, None, t).point_in_world(Cell([0, 12, 0]), DVec3::splat(0.5));
+        let at = |t: f64| lattice(6.0, &wind, None, t).point_in_world(LatticeCell([0, 12, 0]), DVec3::splat(0.5));
         // The integral of 2 t from 1 to 2.
         assert!(((at(2.0) - at(1.0)) - DVec3::new(3.0, -6.0, 0.0)).length() < 1e-9);
     }
@@ -171,7 +171,7 @@ mod tests {
             let row = (6.0 * t) as i64 + 3;
             let at = |speed: f64| {
                 lattice(6.0, &wind([speed, 0.0, 0.0], None), None, t)
-                    .point_in_world(Cell([0, row, 0]), DVec3::splat(0.5))
+                    .point_in_world(LatticeCell([0, row, 0]), DVec3::splat(0.5))
             };
             let displacement = at(2.1) - at(2.0);
             // 3.5 m above the ground, which it comes to in 3.5 / 6 s.
@@ -182,7 +182,9 @@ mod tests {
     #[test]
     fn a_drop_in_the_air_does_not_jump_when_the_wind_changes_but_drifts_with_the_new_wind() {
         let mut wind = wind([2.0, 0.0, 0.0], None);
-        let at = |wind: &Wind, t: f64| lattice(6.0, wind, None, t).point_in_world(Cell([0, 361, 0]), DVec3::splat(0.5));
+        let at = |wind: &Wind, t: f64| {
+            lattice(6.0, wind, None, t).point_in_world(LatticeCell([0, 361, 0]), DVec3::splat(0.5))
+        };
         let before = [at(&wind, 59.5), at(&wind, 60.0)];
         wind.change(60.0, DVec3::new(5.0, 0.0, -3.0), 0.3, 0.0).unwrap();
         assert_eq!([at(&wind, 59.5), at(&wind, 60.0)], before);
@@ -195,7 +197,7 @@ mod tests {
         let [calm, storm] =
             [keyed(&[[0.0, 0.0], [50.0, 0.0], [51.0, 2.0]]), keyed(&[[0.0, 40.0], [50.0, 0.0], [51.0, 2.0]])];
         let at = |velocity: Animated<[f64; 3]>| {
-            lattice(6.0, &wind(velocity, None), None, 60.0).point_in_world(Cell([1, 361, 0]), DVec3::ZERO)
+            lattice(6.0, &wind(velocity, None), None, 60.0).point_in_world(LatticeCell([1, 361, 0]), DVec3::ZERO)
         };
         assert!((at(calm) - at(storm)).length() < 1e-9);
     }
@@ -208,7 +210,7 @@ mod tests {
             let point = DVec3::new(-7.3, 2.2, 11.8);
             let row = lattice.row(point.y);
             let [x, z] = lattice.column(row, DVec2::new(point.x, point.z));
-            let fraction = point - lattice.point_in_world(Cell([x, row, z]), DVec3::ZERO);
+            let fraction = point - lattice.point_in_world(LatticeCell([x, row, z]), DVec3::ZERO);
             let edges = DVec3::new(CELL_SIZE, lattice.height(), CELL_SIZE);
             assert!(fraction.cmpge(DVec3::ZERO).all() && fraction.cmplt(edges).all(), "{fraction}");
         }
@@ -222,12 +224,12 @@ mod tests {
             let [first, last] = [0.4, 2.4].map(|t| lattice(4.03, &wind, Some(2.0), t));
             assert!((first.height() - 1.0).abs() < 0.1);
             for cell in [[0, 0, 0], [3, 5, -2], [-4, -1, 7]] {
-                let point = first.point_in_world(Cell(cell), DVec3::splat(0.5));
+                let point = first.point_in_world(LatticeCell(cell), DVec3::splat(0.5));
                 let row = last.row(point.y);
                 let [x, z] = last.column(row, DVec2::new(point.x, point.z));
-                let found = Cell([x, row, z]);
+                let found = LatticeCell([x, row, z]);
                 assert!((last.point_in_world(found, DVec3::splat(0.5)) - point).length() < 1e-9);
-                assert_eq!(last.contents(found), first.contents(Cell(cell)));
+                assert_eq!(last.contents(found), first.contents(LatticeCell(cell)));
             }
         }
     }

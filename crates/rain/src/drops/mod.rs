@@ -2,6 +2,7 @@
 
 pub(crate) mod cell;
 pub(crate) mod gust;
+mod gust_cells;
 pub(crate) mod lattice;
 pub(crate) mod shutter_state;
 pub mod size_distribution;

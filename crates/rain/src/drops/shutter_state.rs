@@ -6,15 +6,16 @@ use bansho_base::{
         random::{Key, Purpose},
     },
     phenomenon::{
-        strip::View,
+        strip::{Shutter, View},
         surroundings::{Occluder, Surroundings},
     },
 };
 
 use super::{
-    cell::{CellState, GustInterpolant},
-    gust::GustField,
-    lattice::{CELL_SIZE, Cell, Lattice},
+    cell::{CellState, Deviation, DeviationLanes, Deviations},
+    gust::{GustField, GustLanes, GustState, horizontal},
+    gust_cells::{GustLine, Path},
+    lattice::{CELL_SIZE, Lattice, LatticeCell},
 };
 use crate::{
     Rain,
@@ -23,8 +24,8 @@ use crate::{
     shutter_cameras::{MAX_DROP_RADIUS, ShutterCameras},
 };
 
-/// Largest difference between the gust displacement of a drop and that of its cell's center, m.
-const GUST_MARGIN: f64 = 0.2;
+/// Deviation from uniform motion during half an exposure up to which the mean wind counts as constant, m.
+const STEADY_WIND_ERROR: f64 = 1e-6;
 /// Width of the transition from streaks to single scattering as a fraction of the region's radius, half of it on each
 /// side.
 const REGION_FADE: f64 = 0.2;
@@ -61,6 +62,17 @@ impl DropClassState {
     }
 }
 
+/// A drop at the middle of the exposure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DropState {
+    /// m.
+    pub(crate) position: DVec3,
+    /// m/s.
+    pub(crate) velocity: DVec3,
+    /// Horizontal offsets, when the shutter opens and when it closes, from where its velocity would take it, m; `None` for uniform motion.
+    pub(crate) bends: Option<[DVec2; 2]>,
+}
+
 /// A sphere.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sphere {
@@ -76,7 +88,7 @@ pub(crate) struct VisibleCell {
     pub(crate) center: DVec3,
     /// Distance of its center from the camera, m.
     pub(crate) distance: f64,
-    pub(crate) cell: Cell,
+    pub(crate) cell: LatticeCell,
 }
 
 /// The rain while the shutter is open.
@@ -93,8 +105,13 @@ pub(crate) struct ShutterState {
     pub(crate) gain: f64,
     /// Law of the opacity.
     opacity: OpacityLaw,
+    /// Duration of the whole exposure, of which this may be a part, s.
+    whole_exposure: f64,
     /// Horizontal mean wind, scaled by the response of the drops, m/s.
     wind: DVec3,
+    /// Horizontal displacement by the mean wind from the middle of the exposure to its beginning and its end, scaled likewise, m; `None` if the mean wind
+    /// does not change meanwhile.
+    travel: Option<[DVec3; 2]>,
     gusts: Option<GustField>,
     /// Solids that shelter the air below them from rain.
     occluders: Vec<Occluder>,
@@ -107,7 +124,10 @@ impl ShutterState {
         let t = view.shutter.middle();
         let (wind, response) = (surroundings.wind, parameters.wind_response);
         let radius = parameters.distance * (1.0 + REGION_FADE) + 2.0 * CELL_SIZE;
-        let mean = wind.mean(t) * response;
+        let mean = horizontal(wind.mean(t)) * response;
+        let Shutter { open, close } = view.shutter;
+        let travel = [open, close].map(|end| horizontal(wind.travel(t, end)) * response);
+        let is_steady = (0..2).all(|end| (travel[end] - mean * ([open, close][end] - t)).length() < STEADY_WIND_ERROR);
         let ground = ground_height(&surroundings.others.occluders).unwrap_or(parameters.ground_height);
         let (eye, reach) = (cameras.middle().position, parameters.distance * (1.0 + REGION_FADE) + LAMP_MARGIN);
         Self {
@@ -117,11 +137,20 @@ impl ShutterState {
             distance: parameters.distance,
             gain: parameters.opacity_gain,
             opacity: parameters.opacity,
-            wind: DVec3::new(mean.x, 0.0, mean.z),
-            gusts: GustField::new(wind, response, cameras.middle().position, radius, t),
+            whole_exposure: view.shutter.duration(),
+            wind: mean,
+            travel: (!is_steady).then_some(travel),
+            gusts: GustField::new(wind, response, eye, radius, ground, view.shutter, rain.loop_s),
             occluders: surroundings.others.occluders.iter().filter(|solid| !is_ground(solid)).cloned().collect(),
             cameras,
         }
+    }
+
+    /// The rain during one of several equal parts of an exposure, whose streaks come to those of the whole exposure.
+    pub(crate) fn of_part(rain: &Rain, part: &View, surroundings: &Surroundings, parts: usize) -> Self {
+        let state = Self::new(rain, part, surroundings);
+        let whole_exposure = state.whole_exposure * parts as f64;
+        Self { gain: state.gain / parts as f64, whole_exposure, ..state }
     }
 
     /// The weight with which a drop at `distance` from the camera is drawn as a streak: 1 within the region, 0 beyond
@@ -134,7 +163,7 @@ impl ShutterState {
 
     /// Factor of the opacity of drops of a diameter that fall with `speed` (m/s): the gain, and the law.
     pub(crate) fn opacity_factor(&self, diameter_mm: f64, speed: f64) -> f64 {
-        self.gain * self.opacity.factor(diameter_mm, speed, self.cameras.exposure_time)
+        self.gain * self.opacity.factor(diameter_mm, speed, self.whole_exposure)
     }
 
     /// The sphere of `radius` (m) around the camera.
@@ -143,7 +172,8 @@ impl ShutterState {
     }
 
     /// The drops of a cell of a class.
-    pub(crate) fn cell_state(&self, class: &DropClassState, cell: Cell) -> CellState {
+    #[inline(always)]
+    pub(crate) fn cell_state(&self, class: &DropClassState, cell: LatticeCell) -> CellState {
         let eye = self.cameras.middle().position;
         let corner = |step: [f64; 3]| class.lattice.point_in_world(cell, DVec3::from(step));
         let origin = corner([0.0; 3]);
@@ -154,27 +184,134 @@ impl ShutterState {
             corner([0.0, 0.0, 1.0]) - origin,
         ]
         .map(|vector| vector.as_vec3().to_array());
-        let velocity = (self.wind - DVec3::Y * class.speed).as_vec3().to_array();
-        let gusts = self.gusts.as_ref().map(|gusts| {
-            GustInterpolant::new(std::array::from_fn(|index| {
-                gusts.at(corner([index & 1, index >> 1 & 1, index >> 2].map(|step| step as f64)))
-            }))
-        });
-        CellState { base, axes: [right, up, back], velocity, gusts }
+        let velocity = self.steady_velocity(class);
+        let deviations = if self.gusts.is_some() || self.travel.is_some() {
+            Some(Deviations::new(self.deviations_at_corners([corner([0.0; 3]), corner([1.0; 3])], velocity)))
+        } else {
+            None
+        };
+        CellState { base, axes: [right, up, back], velocity: velocity.as_vec3().to_array(), deviations }
     }
 
-    /// Position of a point of a cell (given as fractions of its edges) at the middle of the exposure, and its velocity,
-    /// m/s.
-    pub(crate) fn drop_state(&self, class: &DropClassState, cell: Cell, within: DVec3) -> (DVec3, DVec3) {
-        let steady = class.lattice.point_in_world(cell, within);
-        let velocity = self.wind - DVec3::Y * class.speed;
-        match &self.gusts {
-            None => (steady, velocity),
-            Some(gusts) => {
-                let [displacement, gust] = gusts.at(steady);
-                (steady + displacement, velocity + gust)
-            }
+    /// Velocity of the drops of a class in the mean wind, m/s.
+    fn steady_velocity(&self, class: &DropClassState) -> DVec3 {
+        self.wind - DVec3::Y * class.speed
+    }
+
+    /// Displacement of drops of a steady `velocity` (m/s) by the mean wind from the middle of the exposure to its beginning and its end, and what it is more than
+    /// with that velocity, m.
+    #[inline(always)]
+    fn steady_travel(&self, velocity: DVec3) -> [[DVec3; 2]; 2] {
+        let half = 0.5 * self.cameras.exposure_time;
+        let uniform = [-half, half].map(|time| velocity * time);
+        let Some([open, close]) = self.travel else { return [uniform, [DVec3::ZERO; 2]] };
+        let travel = [DVec3::new(open.x, uniform[0].y, open.z), DVec3::new(close.x, uniform[1].y, close.z)];
+        [travel, [travel[0] - uniform[0], travel[1] - uniform[1]]]
+    }
+
+    /// How a drop deviates from uniform motion that would be at `point` at the middle of the exposure, and whose velocity in the mean wind is `velocity`.
+    fn deviation(&self, point: DVec3, velocity: DVec3) -> Deviation {
+        let half = 0.5 * self.cameras.exposure_time;
+        let [travel, bends] = self.steady_travel(velocity);
+        let bends = bends.map(|bend| DVec2::new(bend.x, bend.z));
+        let mut deviation = Deviation { bends, ..Deviation::default() };
+        if let Some(gusts) = &self.gusts {
+            let GustState { displacements, velocity } = gusts.at(path(point, travel), velocity);
+            let [open, middle, close] = displacements;
+            (deviation.displacement, deviation.velocity) = (middle, velocity);
+            deviation.bends[0] += open - middle + velocity * half;
+            deviation.bends[1] += close - middle - velocity * half;
         }
+        deviation
+    }
+
+    /// The deviations at the corners of a cell between two points, x fastest, then y.
+    #[inline(always)]
+    fn deviations_at_corners(&self, [low, high]: [DVec3; 2], velocity: DVec3) -> [DeviationLanes; 8] {
+        let [travel, bends] = self.steady_travel(velocity);
+        if let Some(gusts) = &self.gusts
+            && let Some(mut corners) = gusts.at_corners(path(low, travel), path(high, travel), velocity)
+        {
+            // A closure passed to `map` would not be compiled for wide vectors.
+            for corner in &mut corners {
+                *corner = self.deviation_of_gusts(corner, bends);
+            }
+            return corners;
+        }
+        std::array::from_fn(|index| {
+            let is_high = [0, 1, 2].map(|axis| index >> axis & 1 == 1);
+            let corner = DVec3::from(std::array::from_fn(|axis| if is_high[axis] { high[axis] } else { low[axis] }));
+            self.deviation(corner, velocity).lanes()
+        })
+    }
+
+    /// The deviation by gusts, and by the bends of the mean wind, m.
+    #[inline(always)]
+    fn deviation_of_gusts(
+        &self,
+        &[open_x, open_z, close_x, close_z, x, z, velocity_x, velocity_z]: &GustLanes,
+        [open, close]: [DVec3; 2],
+    ) -> DeviationLanes {
+        let half = 0.5 * self.cameras.exposure_time as f32;
+        let [open, close] = [open.as_vec3(), close.as_vec3()];
+        [
+            x,
+            z,
+            velocity_x,
+            velocity_z,
+            open_x - x + velocity_x * half + open.x,
+            open_z - z + velocity_z * half + open.z,
+            close_x - x - velocity_x * half + close.x,
+            close_z - z - velocity_z * half + close.z,
+        ]
+    }
+
+    /// A drop at a point of a cell, given as fractions of its edges.
+    pub(crate) fn drop_state(&self, class: &DropClassState, cell: LatticeCell, within: DVec3) -> DropState {
+        let (position, velocity) = (class.lattice.point_in_world(cell, within), self.steady_velocity(class));
+        let gusts = |field: &GustField, path: Path| field.at_point(path, velocity);
+        self.deviated_drop(position, velocity, self.steady_travel(velocity), gusts)
+    }
+
+    /// The drop that without gusts is at a `position` and has a `velocity` (m/s), in the gusts that `at` finds along its path.
+    fn deviated_drop(
+        &self,
+        position: DVec3,
+        velocity: DVec3,
+        [travel, bends]: [[DVec3; 2]; 2],
+        at: impl FnOnce(&GustField, Path) -> Option<GustLanes>,
+    ) -> DropState {
+        if self.gusts.is_none() && self.travel.is_none() {
+            return DropState { position, velocity, bends: None };
+        }
+        let gusts = self.gusts.as_ref().and_then(|field| at(field, path(position, travel)));
+        let lanes = match gusts {
+            Some(gusts) => self.deviation_of_gusts(&gusts, bends),
+            None => self.deviation(position, velocity).lanes(),
+        };
+        let [x, z, velocity_x, velocity_z, open_x, open_z, close_x, close_z] = lanes.map(f64::from);
+        DropState {
+            position: position + DVec3::new(x, 0.0, z),
+            velocity: velocity + DVec3::new(velocity_x, 0.0, velocity_z),
+            bends: Some([DVec2::new(open_x, open_z), DVec2::new(close_x, close_z)]),
+        }
+    }
+
+    /// The drops at the centers of the cells `[x, row]` of a class from one z to another.
+    fn drop_line(&self, class: &DropClassState, [x, row]: [i64; 2], ends: [i64; 2]) -> DropLine {
+        let velocity = self.steady_velocity(class);
+        let [travel, bends] = self.steady_travel(velocity);
+        let [from, to] =
+            ends.map(|z| path(class.lattice.point_in_world(LatticeCell([x, row, z]), DVec3::splat(0.5)), travel));
+        let gusts = self.gusts.as_ref().and_then(|gusts| gusts.along_z(from, to, velocity));
+        DropLine { velocity, travel, bends, gusts }
+    }
+
+    /// The drop at the center of a cell of a line.
+    fn drop_of_line(&self, class: &DropClassState, cell: LatticeCell, line: &DropLine) -> DropState {
+        let position = class.lattice.point_in_world(cell, DVec3::splat(0.5));
+        let gusts = |field: &GustField, path: Path| field.at_line(line.gusts.as_ref()?, path);
+        self.deviated_drop(position, line.velocity, [line.travel, line.bends], gusts)
     }
 
     /// Cells of a class with drops that may be visible within a sphere. Drops are drawn up to `half_width` (m) from the cell's center in x and z.
@@ -185,44 +322,57 @@ impl ShutterState {
         half_width: f64,
     ) -> Vec<VisibleCell> {
         let eye = self.cameras.middle().position;
-        let margin = self.gusts.as_ref().map_or(0.0, |_| GUST_MARGIN);
-        let half = class.lattice.half_extents(half_width) + margin;
-        let reach = radius + half.max_element();
-        let bounds = [center - reach, center + reach];
-        let [low, high] = self.gusts.as_ref().map_or(bounds, |gusts| gusts.source_bounds(bounds));
-        let travel = 0.5 * (class.speed + self.cameras.velocity().length()) * self.cameras.exposure_time
-            + margin
-            + MAX_DROP_RADIUS;
+        let extents = class.lattice.half_extents(half_width);
+        // The drops that gusts carry into the sphere, and the centers of their cells.
+        let sphere = [center - radius, center + radius];
+        let [low, high] = self.gusts.as_ref().map_or(sphere, |gusts| gusts.source_bounds(sphere));
+        let [low, high] = [low - extents, high + extents];
+        let travel =
+            0.5 * (class.speed + self.cameras.velocity().length()) * self.cameras.exposure_time + MAX_DROP_RADIUS;
         let mut cells = Vec::new();
-        let mut add = |cell| {
-            let (point, velocity) = self.drop_state(class, cell, DVec3::splat(0.5));
+        let mut add = |cell, line: &DropLine| {
+            let DropState { position: point, velocity, bends } = self.drop_of_line(class, cell, line);
+            // Drops are displaced by other gusts than the center of their cell.
+            let margin = self.gusts.as_ref().map_or(DVec3::ZERO, |gusts| {
+                let undisplaced = class.lattice.point_in_world(cell, DVec3::splat(0.5));
+                gusts.difference_around(undisplaced, extents.max_element())
+            });
+            let half = extents + margin;
             let nearest = ((point - center).abs() - half).max(DVec3::ZERO).length();
-            let wind_travel = 0.5 * DVec3::new(velocity.x, 0.0, velocity.z).length() * self.cameras.exposure_time;
+            let bend = bends.map_or(0.0, |[open, close]| open.length().max(close.length()));
+            let wind_travel = 0.5 * horizontal(velocity).length() * self.cameras.exposure_time + bend;
             if nearest < radius && self.cameras.may_be_visible(point, half, travel + wind_travel) {
                 cells.push(VisibleCell { center: point, distance: (point - eye).length(), cell });
             }
         };
-        let lines = self.cell_lines(half, travel);
+        let lines = self.cell_lines(class, extents, travel);
         let rows = [low.y.max(self.ground - CELL_SIZE), high.y].map(|y| class.lattice.row(y));
         for row in rows[0]..=rows[1] {
             let [first, last] = [low, high].map(|corner| class.lattice.column(row, DVec2::new(corner.x, corner.z)));
             for x in first[0]..=last[0] {
                 let [from, to] = lines.visible_part(class, [x, row], [first[1], last[1]]);
-                (from..=to).for_each(|z| add(Cell([x, row, z])));
+                if from <= to {
+                    let line = self.drop_line(class, [x, row], [from, to]);
+                    (from..=to).for_each(|z| add(LatticeCell([x, row, z]), &line));
+                }
             }
         }
         cells
     }
 
-    /// Lines of cells whose drops move up to `travel` (m) relative to the camera beside what the wind adds.
-    fn cell_lines(&self, half: DVec3, travel: f64) -> CellLines<'_> {
-        let ([min, max], gust_speed) = self.gusts.as_ref().map_or(([DVec3::ZERO; 2], 0.0), |gusts| gusts.extremes());
-        let wind_travel = 0.5 * (self.wind.length() + gust_speed) * self.cameras.exposure_time;
+    /// Lines of cells of a class whose drops move up to `travel` (m) relative to the camera beside what the wind adds.
+    fn cell_lines(&self, class: &DropClassState, half: DVec3, travel: f64) -> CellLines<'_> {
+        let half_s = 0.5 * self.cameras.exposure_time;
+        let [min, max] = self.gusts.as_ref().map_or([DVec3::ZERO; 2], GustField::extremes);
+        let by_gusts =
+            self.gusts.as_ref().map_or(0.0, |gusts| gusts.largest_travel(self.steady_velocity(class), half_s));
+        let by_wind =
+            self.travel.map_or(self.wind.length() * half_s, |[open, close]| open.length().max(close.length()));
         CellLines {
             cameras: &self.cameras,
             displacement: 0.5 * (min + max),
             half: half + 0.5 * (max - min),
-            travel: travel + wind_travel,
+            travel: travel + by_wind + by_gusts,
         }
     }
 
@@ -235,6 +385,23 @@ impl ShutterState {
     pub(crate) fn is_sheltered(&self, point: DVec3, velocity: DVec3) -> bool {
         self.occluders.iter().any(|occluder| ray_hits_occluder(occluder, point, -velocity.normalize_or_zero()))
     }
+}
+
+/// The drops at the centers of a line of cells along z.
+struct DropLine {
+    /// Velocity in the mean wind, m/s.
+    velocity: DVec3,
+    /// [Travel and bends](ShutterState::steady_travel) by the mean wind, m.
+    travel: [DVec3; 2],
+    bends: [DVec3; 2],
+    /// `None` without gusts.
+    gusts: Option<GustLine>,
+}
+
+/// Where a drop that is at `point` at the middle of the exposure is when the shutter opens, at the middle and when it closes, by its `travel`, m.
+#[inline(always)]
+fn path(point: DVec3, [open, close]: [DVec3; 2]) -> Path {
+    [point + open, point, point + close]
 }
 
 /// Lines of cells along z, to find which of them may be visible without a look at each.
@@ -251,7 +418,7 @@ struct CellLines<'a> {
 impl CellLines<'_> {
     /// The range of cells along z that may be visible, within a range, for `[x, row]`. Reversed if there are none.
     fn visible_part(&self, class: &DropClassState, [x, row]: [i64; 2], [first, last]: [i64; 2]) -> [i64; 2] {
-        let start = class.lattice.point_in_world(Cell([x, row, 0]), DVec3::splat(0.5)) + self.displacement;
+        let start = class.lattice.point_in_world(LatticeCell([x, row, 0]), DVec3::splat(0.5)) + self.displacement;
         let [from, to] = self.cameras.visible_part([start, DVec3::Z * CELL_SIZE], self.half, self.travel);
         // One more on each side, for rounding.
         [first.max((from - 1.0).floor() as i64), last.min((to + 1.0).ceil() as i64)]

@@ -1,12 +1,15 @@
 //! Radiance of drops in the light of lamps and fires.
 
 use bansho_base::{
-    math::{self, DVec3, MulAdd, approximations, simd::LANES},
+    math::{
+        self, DVec3, approximations,
+        simd::{LANES, Real},
+    },
     phenomenon::surroundings::{Emitter, Light},
 };
 
 use super::{drop_phase_function::DropPhaseFunction, tiles::lerp_color};
-use crate::lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min};
+use crate::lanes::{LaneArray, Vec3Lanes, ZERO_LANES};
 
 /// Steps of a [`ScatteringTable`].
 const TABLE_STEPS: usize = 2048;
@@ -46,7 +49,7 @@ impl ScatteringTable {
     /// Table position for the cosine of the scattering angle.
     #[inline(always)]
     fn position(cos_deviation: f32) -> f32 {
-        fast_min(1.0, fast_max(0.0, (1.0 - cos_deviation) * 0.5)).sqrt() * TABLE_STEPS as f32
+        ((1.0 - cos_deviation) * 0.5).simd_clamp01().sqrt() * TABLE_STEPS as f32
     }
 
     /// Linear interpolation at a table position.
@@ -68,7 +71,7 @@ pub(crate) struct DropLighting<'a> {
 
 impl DropLighting<'_> {
     /// Mean radiance of a drop at `point` by one light, seen along `direction` (unit vector from the eye), ACEScg, cd/m^2:
-    /// `E p / (4 pi)`: the scalar twin of [`add`](Self::add).
+    /// `E p / (4 pi)`. Computes for one drop what [`add`](Self::add) computes for sixteen.
     #[cfg(test)]
     pub(crate) fn radiance(&self, light: &Light, point: DVec3, direction: DVec3) -> [f32; 3] {
         let bansho_base::phenomenon::surroundings::IncidentLight { illuminance, toward, distance } =
@@ -94,7 +97,7 @@ impl DropLighting<'_> {
         &self,
         light: &PreparedLight,
         positions: &Vec3Lanes,
-        weights: &Lanes,
+        weights: &LaneArray,
         radiance: &mut [[f32; 3]; LANES],
     ) {
         let (factors, table_positions) = light.incident_light(positions, self.extinction as f32);
@@ -185,7 +188,7 @@ impl PreparedLight {
     /// For sixteen positions relative to the camera: illuminance over intensity, attenuated by the rain, and the table
     /// position in [`ScatteringTable`] of the scattering angle toward the camera.
     #[inline(always)]
-    fn incident_light(&self, [xs, ys, zs]: &Vec3Lanes, extinction: f32) -> (Lanes, Lanes) {
+    fn incident_light(&self, [xs, ys, zs]: &Vec3Lanes, extinction: f32) -> (LaneArray, LaneArray) {
         let (mut factors, mut table_positions) = (ZERO_LANES, ZERO_LANES);
         let [x, y, z] = self.position;
         for i in 0..LANES {
@@ -193,16 +196,15 @@ impl PreparedLight {
             let offset = [x - is_local * xs[i], y - is_local * ys[i], z - is_local * zs[i]];
             let square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
             let distance = square.sqrt();
-            let inverse = 1.0 / fast_max(f32::MIN_POSITIVE, distance);
+            let inverse = 1.0 / distance.simd_max(f32::MIN_POSITIVE);
             let from = -(offset[0] * self.axis[0] + offset[1] * self.axis[1] + offset[2] * self.axis[2]) * inverse;
-            let cone = fast_min(1.0, fast_max(0.0, from.fma(self.cone[0], self.cone[1])));
+            let cone = from.fma(self.cone[0], self.cone[1]).simd_clamp01();
             let cone_factor = cone * cone * (3.0 - 2.0 * cone);
-            let distance_squared = fast_max(self.min_distance_squared, is_local * square + (1.0 - is_local));
+            let distance_squared = (is_local * square + (1.0 - is_local)).simd_max(self.min_distance_squared);
             factors[i] = cone_factor / distance_squared * approximations::exp(-extinction * is_local * distance);
             let drop_distance = (xs[i] * xs[i] + ys[i] * ys[i] + zs[i] * zs[i]).sqrt();
             let along = offset[0] * xs[i] + offset[1] * ys[i] + offset[2] * zs[i];
-            table_positions[i] =
-                ScatteringTable::position(along * inverse / fast_max(f32::MIN_POSITIVE, drop_distance));
+            table_positions[i] = ScatteringTable::position(along * inverse / drop_distance.simd_max(f32::MIN_POSITIVE));
         }
         (factors, table_positions)
     }

@@ -6,12 +6,15 @@
 //! integrand has no peak near the lamp. Positions are counted from the start of an interval, which needs no tangent and keeps single precision sufficient.
 
 use bansho_base::{
-    math::{DVec3, MulAdd, approximations, simd::LANES},
+    math::{
+        DVec3, approximations,
+        simd::{LANES, Real},
+    },
     phenomenon::surroundings::{Emitter, Light},
 };
 
 use super::{drop_lighting::ScatteringTable, extinction::ExtinctionProfile};
-use crate::lanes::{Lanes, ZERO_LANES, fast_max, fast_min};
+use crate::lanes::{LaneArray, ZERO_LANES};
 
 /// Angle subtended at a lamp by one sample, radians.
 const SAMPLE_ANGLE: f32 = 0.15;
@@ -67,14 +70,14 @@ struct SampleBatch {
     count: usize,
     interval: [u32; LANES],
     /// Distance of the start of the interval from the eye, and from the point nearest to the lamp, m.
-    start: Lanes,
-    u: Lanes,
-    width: Lanes,
-    depth: Lanes,
-    depth_slope: Lanes,
+    start: LaneArray,
+    u: LaneArray,
+    width: LaneArray,
+    depth: LaneArray,
+    depth_slope: LaneArray,
     /// Angle at the lamp from the start to the sample, and of the sample itself, radians.
-    angle: Lanes,
-    step: Lanes,
+    angle: LaneArray,
+    step: LaneArray,
 }
 
 impl SampleBatch {
@@ -174,7 +177,7 @@ impl SightLineIntegrator<'_> {
         for (index, interval) in self.intervals.iter().enumerate() {
             let u = (interval.start - lamp.nearest) as f32;
             let angle = approximations::atan2(h * interval.width, h.fma(h, u * (u + interval.width)));
-            let samples = fast_max(1.0, (angle * (1.0 / SAMPLE_ANGLE)).ceil());
+            let samples = (angle * (1.0 / SAMPLE_ANGLE)).ceil().simd_max(1.0);
             let step = angle / samples;
             for sample in 0..samples as i32 {
                 batch.push(index, interval, u, step * (sample as f32 + 0.5), step);
@@ -212,7 +215,7 @@ impl SightLineIntegrator<'_> {
 
     /// `beta e^-tau ds / r^2` of sixteen samples, with the lamp's cone, and the sine of half the scattering angle.
     #[inline(always)]
-    fn weights(&self, lamp: &LampAtLine, climb: f32, batch: &SampleBatch) -> (Lanes, Lanes) {
+    fn weights(&self, lamp: &LampAtLine, climb: f32, batch: &SampleBatch) -> (LaneArray, LaneArray) {
         let h = lamp.height;
         let (mut weights, mut half_sines, mut distances) = (ZERO_LANES, ZERO_LANES, ZERO_LANES);
         for i in 0..LANES {
@@ -221,26 +224,26 @@ impl SightLineIntegrator<'_> {
             let (sine, cosine) = (approximations::sin_turns(turns), approximations::cos_turns(turns));
             let from = batch.u[i];
             let advance = sine * from.fma(from, h * h) / h.fma(cosine, -(from * sine));
-            let advance = fast_min(batch.width[i], fast_max(0.0, advance));
+            let advance = advance.simd_max(0.0).simd_min(batch.width[i]);
             let u = from + advance;
             let length = batch.step[i] * u.fma(u, h * h) / h;
             let square = u.fma(u, lamp.height_squared);
-            let r = fast_max(1e-9, square.sqrt());
+            let r = square.sqrt().simd_max(1e-9);
             let cone_cosine = u.fma(lamp.cone[1], lamp.cone[0]) / r;
-            let cone = fast_min(1.0, fast_max(0.0, cone_cosine.fma(lamp.falloff[0], lamp.falloff[1])));
+            let cone = cone_cosine.fma(lamp.falloff[0], lamp.falloff[1]).simd_clamp01();
             let falloff = cone * cone * (3.0 - 2.0 * cone);
             // The light comes along (h, u): without cancellation, 2 r sin^2 (angle / 2) = r + u = h^2 / (r - u).
             let excess = if u < 0.0 { lamp.height_squared / (r - u) } else { r + u };
-            half_sines[i] = fast_min(1.0, fast_max(0.0, 0.5 * excess / r)).sqrt();
+            half_sines[i] = (0.5 * excess / r).simd_clamp01().sqrt();
             distances[i] = batch.start[i] + advance;
             let depth = batch.depth_slope[i].fma(advance, batch.depth[i]) + self.light_extinction * r;
             let is_over_ground = climb.fma(distances[i], self.eye_height) >= 0.0;
-            let weight = falloff * length / fast_max(lamp.min_square, square) * approximations::exp(-depth);
+            let weight = falloff * length / square.simd_max(lamp.min_square) * approximations::exp(-depth);
             weights[i] = if is_over_ground { weight } else { 0.0 };
         }
         let extinction = self.extinction.at_lanes(&distances);
         for i in 0..LANES {
-            weights[i] *= fast_max(0.0, extinction[i]);
+            weights[i] *= extinction[i].simd_max(0.0);
         }
         (weights, half_sines)
     }

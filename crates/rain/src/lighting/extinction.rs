@@ -6,7 +6,7 @@ use bansho_base::math::simd::LANES;
 
 use crate::{
     drops::{shutter_state::ShutterState, size_distribution::DropSizeDistribution},
-    lanes::{Lanes, ZERO_LANES},
+    lanes::{LaneArray, ZERO_LANES},
 };
 
 /// Extinction efficiency Q of a drop. Drops are large compared with the wavelength, so the total Q is 2 (the extinction
@@ -59,7 +59,7 @@ impl ExtinctionProfile<'_> {
 
     /// At sixteen distances.
     #[inline(always)]
-    pub(super) fn at_lanes(&self, distances: &Lanes) -> Lanes {
+    pub(super) fn at_lanes(&self, distances: &LaneArray) -> LaneArray {
         let (all, streaks) = (self.extinction.all as f32, self.extinction.streaks as f32);
         let mut coefficients = ZERO_LANES;
         for i in 0..LANES {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use bansho_base::{
     camera::directions::Directions,
-    math::{MulAdd, simd::LANES},
+    math::simd::{LANES, Real},
     phenomenon::strip::DepthInterval,
 };
 
@@ -13,7 +13,7 @@ use super::{
     in_scattering::{HALO_RADIUS, LampHalo},
     ray_segments::{MediumBounds, OpticalDepthTable, RaySegments, any_range},
 };
-use crate::lanes::{Lanes, ZERO_LANES, fast_max, fast_min, smoothstep};
+use crate::lanes::{LaneArray, ZERO_LANES, smoothstep};
 
 /// Distance from a lamp, as a fraction of [`HALO_RADIUS`], from which its correction fades out.
 const FADE_START: f32 = 0.6;
@@ -74,7 +74,7 @@ impl HaloCorrector<'_> {
 
     /// Corrections of the sixteen pixels from column `x` on.
     #[inline(always)]
-    fn sixteen(&self, x: usize, y: usize, plate: &Lanes, rows: &HaloRows) -> [[f32; 3]; LANES] {
+    fn sixteen(&self, x: usize, y: usize, plate: &LaneArray, rows: &HaloRows) -> [[f32; 3]; LANES] {
         let mut corrections = [[0.0; 3]; LANES];
         let fades = self.fades(x, y);
         let mut directions = Directions::new(self.bounds.camera, x, y);
@@ -105,7 +105,7 @@ impl HaloCorrector<'_> {
 
     /// Weights of the corrections of sixteen pixels.
     #[inline(always)]
-    fn fades(&self, x: usize, y: usize) -> Lanes {
+    fn fades(&self, x: usize, y: usize) -> LaneArray {
         let [left, top] = self.halo.pixel.to_array();
         let (across, down) = ((x as f64 + 0.5 - left) as f32, (y as f64 + 0.5 - top) as f32);
         let mut fades = ZERO_LANES;
@@ -119,14 +119,14 @@ impl HaloCorrector<'_> {
 
     /// Inverse distances of the lamp from sixteen lines of sight, 1/m.
     #[inline(always)]
-    fn inverse_ray_distances(&self, directions: &Directions) -> Lanes {
+    fn inverse_ray_distances(&self, directions: &Directions) -> LaneArray {
         let [x, y, z] = self.halo.offset.as_vec3().to_array();
         let [xs, ys, zs] = &directions.components;
         let mut inverse = ZERO_LANES;
         for i in 0..LANES {
             let normal = [y * zs[i] - z * ys[i], z * xs[i] - x * zs[i], x * ys[i] - y * xs[i]];
             let distance = (normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]).sqrt();
-            inverse[i] = 1.0 / fast_max(MIN_LAMP_DISTANCE as f32, fast_min(f32::MAX, distance));
+            inverse[i] = 1.0 / distance.simd_min(f32::MAX).simd_max(MIN_LAMP_DISTANCE as f32);
         }
         inverse
     }

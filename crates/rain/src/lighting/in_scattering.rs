@@ -51,8 +51,7 @@ impl InScattering {
         if lights.iter().any(|light| matches!(light.emitter, Emitter::Spot { .. })) {
             return Self::new(integrator, tiles, lights);
         }
-        let pixel = |light: &Light| Some(camera.project(light.emitter.position()?)?.pixel);
-        let lamps: Vec<DVec2> = lights.iter().filter_map(pixel).collect();
+        let lamps: Vec<DVec2> = lights.iter().flat_map(|light| lamp_images(light, camera, SMOOTH_RADIUS)).collect();
         let is_near_lamp = |corner: usize| {
             let here = DVec2::from(tiles.pixel(corner).map(|coordinate| coordinate as f64));
             lamps.iter().any(|lamp| lamp.distance_squared(here) < SMOOTH_RADIUS * SMOOTH_RADIUS)
@@ -297,7 +296,10 @@ impl InScatterIntegrator<'_> {
             eye: self.eye,
             eye_height: (self.eye.y - self.extinction.shutter_state.ground) as f32,
         };
-        let halos = visible.iter().filter_map(|(light, pixel)| halo(&integrator, light, *pixel, view)).collect();
+        let mut halos = Vec::new();
+        for (light, images) in &visible {
+            halos.extend(images.iter().filter_map(|pixel| halo(&integrator, light, *pixel, view)));
+        }
         lights.extend(visible.iter().map(|(light, _)| *light));
         let in_scattering =
             (!lights.is_empty()).then(|| InScattering::over_picture(&integrator, tiles, &lights, &view.camera));
@@ -305,20 +307,29 @@ impl InScatterIntegrator<'_> {
     }
 
     /// Lamps in and near the picture with their pixels, and all other lights.
-    fn split_lights(&self, view: &View) -> (Vec<(Light, DVec2)>, Vec<Light>) {
+    fn split_lights(&self, view: &View) -> (Vec<(Light, Vec<DVec2>)>, Vec<Light>) {
         let (mut visible, mut others) = (Vec::new(), Vec::new());
         for light in self.lighting.lights {
-            let projection = light.emitter.position().and_then(|position| view.camera.project(position));
-            let near = |pixel: DVec2| {
-                (0..2).all(|axis| (-HALO_RADIUS..view.size[axis] as f64 + HALO_RADIUS).contains(&pixel[axis]))
-            };
-            match projection.map(|projection| projection.pixel).filter(|pixel| near(*pixel)) {
-                Some(pixel) if visible.len() < MAX_HALOS => visible.push((*light, pixel)),
-                _ => others.push(*light),
+            let images = lamp_images(light, &view.camera, HALO_RADIUS);
+            if images.is_empty() || visible.len() == MAX_HALOS {
+                others.push(*light);
+            } else {
+                visible.push((*light, images));
             }
         }
         (visible, others)
     }
+}
+
+/// The pixels at which a lamp is seen, within the picture or at most `margin` pixels outside of it: several in a panorama, which repeats after 360
+/// degrees, so that what surrounds a lamp is seen on both sides of the seam.
+fn lamp_images(light: &Light, camera: &Camera, margin: f64) -> Vec<DVec2> {
+    let Some(projection) = light.emitter.position().and_then(|position| camera.project(position)) else {
+        return Vec::new();
+    };
+    let is_near = |pixel: &DVec2| (0..2).all(|axis| (-margin..camera.size[axis] + margin).contains(&pixel[axis]));
+    let images = camera.line_images(projection.pixel, projection.pixel, margin);
+    images.into_iter().map(|[pixel, _]| pixel).filter(is_near).collect()
 }
 
 /// The halo of a lamp; `None` for a light at infinity, and where no pixel is near it.
@@ -329,7 +340,9 @@ fn halo(integrator: &SightLineIntegrator, light: &Light, pixel: DVec2, view: &Vi
         return None;
     }
     let tiles = TileGrid::over(view, FINE_TILE, around_tiles(rect));
-    let fine_tiles = TileGrid::over(view, FINEST_TILE, rect);
+    // On both sides of the seam of a panorama the grid has the same corners.
+    let repeats = view.camera.horizontal_period().is_some();
+    let fine_tiles = TileGrid::over(view, FINEST_TILE, if repeats { around_tiles(rect) } else { rect });
     let [in_scattering, mut fine_in_scattering] =
         [&tiles, &fine_tiles].map(|tiles| InScattering::new(integrator, tiles, std::slice::from_ref(light)));
     let corners = fine_in_scattering.sums.chunks_mut(fine_in_scattering.distances);

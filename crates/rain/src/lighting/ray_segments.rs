@@ -2,11 +2,14 @@
 
 use bansho_base::{
     camera::{Camera, directions::Directions},
-    math::{MulAdd, approximations, simd::LANES},
+    math::{
+        approximations,
+        simd::{LANES, Real},
+    },
     phenomenon::strip::DepthInterval,
 };
 
-use crate::lanes::{Lanes, ZERO_LANES, fast_max, fast_min};
+use crate::lanes::{LaneArray, ZERO_LANES};
 
 /// Optical depth beyond which light of lamps is neglected: the transmittance is below 1e-17.
 const MAX_OPTICAL_DEPTH: f32 = 40.0;
@@ -49,11 +52,11 @@ impl OpticalDepthTable {
 
     /// Sixteen distances (m) in the table.
     #[inline(always)]
-    fn locate(&self, distances: &Lanes) -> TablePositions {
+    fn locate(&self, distances: &LaneArray) -> TablePositions {
         let (mut low, mut high) = (distances[0], distances[0]);
         for i in 1..LANES {
-            low = fast_min(low, distances[i]);
-            high = fast_max(high, distances[i]);
+            low = distances[i].simd_min(low);
+            high = distances[i].simd_max(high);
         }
         let [first, last] = [low, high].map(|distance| self.interval(distance));
         let mut found = TablePositions { index: [first as u32; LANES], fraction: ZERO_LANES, depth: ZERO_LANES };
@@ -72,7 +75,7 @@ impl OpticalDepthTable {
         }
         let [start, inverse_width, depth, increase] = &columns;
         for i in 0..LANES {
-            found.fraction[i] = fast_min(1.0, fast_max(0.0, (distances[i] - start[i]) * inverse_width[i]));
+            found.fraction[i] = ((distances[i] - start[i]) * inverse_width[i]).simd_clamp01();
             found.depth[i] = increase[i].fma(found.fraction[i], depth[i]);
         }
         found
@@ -94,9 +97,9 @@ impl OpticalDepthTable {
 struct TablePositions {
     index: [u32; LANES],
     /// Interpolation fraction toward the next distance.
-    fraction: Lanes,
+    fraction: LaneArray,
     /// Optical depth.
-    depth: Lanes,
+    depth: LaneArray,
 }
 
 /// The distances between which lines of sight are in the medium.
@@ -112,7 +115,12 @@ pub(super) struct MediumBounds<'a> {
 impl MediumBounds<'_> {
     /// Start and end of sixteen lines of sight within a depth interval and in front of a `plate` (depths, m); both alike where there is none.
     #[inline(always)]
-    pub(super) fn ranges(&self, directions: &mut Directions, slice: &DepthInterval, plate: &Lanes) -> [Lanes; 2] {
+    pub(super) fn ranges(
+        &self,
+        directions: &mut Directions,
+        slice: &DepthInterval,
+        plate: &LaneArray,
+    ) -> [LaneArray; 2] {
         let lengths = directions.normalize();
         let (slice_near, slice_far) = (slice.near as f32, slice.far as f32);
         let is_beneath = self.height < 0.0;
@@ -121,11 +129,11 @@ impl MediumBounds<'_> {
             let ground = self.height / -directions.components[1][i];
             let ground = if ground > 0.0 { ground } else { f32::INFINITY };
             let near = slice_near * lengths[i];
-            let far = fast_min(slice_far, plate[i]) * lengths[i];
-            let near = if is_beneath { fast_max(near, ground) } else { near };
-            let far = if is_beneath { far } else { fast_min(far, ground) };
-            let near = fast_min(self.end, near);
-            let far = fast_max(near, fast_min(self.end, far));
+            let far = plate[i].simd_min(slice_far) * lengths[i];
+            let near = if is_beneath { ground.simd_max(near) } else { near };
+            let far = if is_beneath { far } else { ground.simd_min(far) };
+            let near = near.simd_min(self.end);
+            let far = far.simd_min(self.end).simd_max(near);
             nears[i] = if directions.visible[i] { near } else { 0.0 };
             fars[i] = if directions.visible[i] { far } else { 0.0 };
         }
@@ -135,7 +143,7 @@ impl MediumBounds<'_> {
 
 /// Whether any range is longer than 0.
 #[inline(always)]
-pub(super) fn any_range([near, far]: &[Lanes; 2]) -> bool {
+pub(super) fn any_range([near, far]: &[LaneArray; 2]) -> bool {
     let mut any = false;
     for i in 0..LANES {
         any |= far[i] > near[i];
@@ -147,18 +155,18 @@ pub(super) fn any_range([near, far]: &[Lanes; 2]) -> bool {
 pub(super) struct RaySegments {
     /// Their ends among the distances at which the light of lamps is stored.
     index: [[u32; LANES]; 2],
-    fraction: [Lanes; 2],
+    fraction: [LaneArray; 2],
     /// Optical depths of their ends.
-    depths: [Lanes; 2],
+    depths: [LaneArray; 2],
     /// Inverse transmittance from the camera to their near ends; 0 beyond the range of lamps and where nothing is transmitted.
-    gain: Lanes,
+    gain: LaneArray,
     any_lit: bool,
 }
 
 impl RaySegments {
     /// The segments between two distances each (m). Lamps light the rain up to `lit_end` (m).
     #[inline(always)]
-    pub(super) fn new(table: &OpticalDepthTable, [near, far]: &[Lanes; 2], lit_end: f32) -> Self {
+    pub(super) fn new(table: &OpticalDepthTable, [near, far]: &[LaneArray; 2], lit_end: f32) -> Self {
         let [mut from, mut to] = [table.locate(near), table.locate(far)];
         let (mut gain, mut any_lit) = (ZERO_LANES, false);
         for i in 0..LANES {
@@ -204,14 +212,14 @@ impl RaySegments {
         }
         let mut difference = [0.0; 4];
         for c in 0..4 {
-            difference[c] = fast_max(0.0, ends[1][c] - ends[0][c]);
+            difference[c] = (ends[1][c] - ends[0][c]).simd_max(0.0);
         }
         difference
     }
 
     /// Opacity of the segments.
     #[inline(always)]
-    pub(super) fn opacities(&self) -> Lanes {
+    pub(super) fn opacities(&self) -> LaneArray {
         let mut opacities = ZERO_LANES;
         for i in 0..LANES {
             opacities[i] = 1.0 - approximations::exp(self.depths[0][i] - self.depths[1][i]);
@@ -221,7 +229,7 @@ impl RaySegments {
 
     /// Sum of the opacities of the medium up to both ends.
     #[inline(always)]
-    pub(super) fn opacities_up_to_ends(&self) -> Lanes {
+    pub(super) fn opacities_up_to_ends(&self) -> LaneArray {
         let mut sums = ZERO_LANES;
         for i in 0..LANES {
             sums[i] = 2.0 - approximations::exp(-self.depths[0][i]) - approximations::exp(-self.depths[1][i]);

@@ -7,7 +7,10 @@ use bansho_base::{
     camera::directions::Directions,
     host::once::get_or_compute,
     image::Rect,
-    math::{DVec2, DVec3, MulAdd, simd::LANES},
+    math::{
+        DVec2, DVec3,
+        simd::{LANES, Real},
+    },
     phenomenon::strip::{DepthInterval, Strip, View},
 };
 use fearless_simd::{Level, dispatch};
@@ -23,7 +26,7 @@ use super::{
 };
 use crate::{
     drops::shutter_state::ShutterState,
-    lanes::{Lanes, ZERO_LANES, fast_max},
+    lanes::{LaneArray, ZERO_LANES},
 };
 
 /// First distance at which accumulated in-scattering is stored, m, and the ratio of successive distances.
@@ -39,7 +42,7 @@ const NO_DEPTH: [f32; FINE_TILE] = [f32::INFINITY; FINE_TILE];
 const _: () = assert!(FINE_TILE == LANES);
 
 /// Radiance (three colors) and opacity of sixteen segments.
-type Layer = [Lanes; 4];
+type Layer = [LaneArray; 4];
 
 /// Extinction and single scattering along the lines of sight of one frame.
 pub(crate) struct SingleScattering<'a> {
@@ -60,8 +63,8 @@ pub(crate) struct SingleScattering<'a> {
 
 /// Sky light at sixteen positions: radiance of rain that scatters once, and of infinitely deep rain.
 struct SkyColors {
-    once: [Lanes; 3],
-    endless: [Lanes; 3],
+    once: [LaneArray; 3],
+    endless: [LaneArray; 3],
 }
 
 impl<'a> SingleScattering<'a> {
@@ -137,11 +140,11 @@ impl<'a> SingleScattering<'a> {
     /// Approximation of multiple scattering: rain of opacity o shows `o (1 - o)` of the sky light that is scattered once, and `o^2` of that of infinitely
     /// deep rain.
     #[inline(always)]
-    fn scattered_sky(sky: &SkyColors, rescattered: &Lanes, opacities: &Lanes, c: usize) -> Lanes {
+    fn scattered_sky(sky: &SkyColors, rescattered: &LaneArray, opacities: &LaneArray, c: usize) -> LaneArray {
         let mut light = ZERO_LANES;
         for i in 0..LANES {
             let (once, endless) = (sky.once[c][i], sky.endless[c][i]);
-            light[i] = fast_max(0.0, (endless - once).fma(rescattered[i], once)) * opacities[i];
+            light[i] = (endless - once).fma(rescattered[i], once).simd_max(0.0) * opacities[i];
         }
         light
     }
@@ -312,7 +315,7 @@ impl<'a> SingleScattering<'a> {
         row: GridPosition,
         sums: &[[f32; 4]],
         slice: &DepthInterval,
-        plate: &Lanes,
+        plate: &LaneArray,
     ) -> Option<Layer> {
         let mut directions = Directions::new(&self.view.camera, column * FINE_TILE, y);
         let ranges = self.bounds(true).ranges(&mut directions, slice, plate);

@@ -85,7 +85,7 @@ fn endless_rain(tiles: &TileGrid, sky: &Sky) -> Vec<[f32; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::world::sky::SkyParameters;
+    use bansho_base::world::sky::SkyKind;
 
     use super::*;
     use crate::tests::view_at;
@@ -94,8 +94,7 @@ mod tests {
     fn a_sky_that_is_seen_again_is_found_once_and_any_other_anew() {
         let (phase_function, skies) = (DropPhaseFunction::new(), SkyLightingCache::default());
         let view = view_at(1.0, 0.02, [64, 36]);
-        let [dim, bright] = [1.0, 2.0]
-            .map(|luminance: f64| SkyParameters { luminance: luminance.into(), ..SkyParameters::default() }.at(0.0));
+        let [dim, bright] = [1.0, 2.0].map(|luminance| Sky::new(SkyKind::Overcast, luminance, 7000.0));
         let first = skies.for_view(&phase_function, &view, dim);
         assert!(
             Arc::ptr_eq(&first, &skies.for_view(&phase_function, &view_at(7.0, 0.02, [64, 36]), dim)),

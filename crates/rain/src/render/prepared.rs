@@ -13,6 +13,7 @@ use bansho_base::{
 };
 use fearless_simd::{Level, Simd, dispatch};
 
+use super::exposure_parts::exposure_parts;
 use crate::{
     Rain,
     aovs::write_aovs,
@@ -56,42 +57,29 @@ pub(crate) struct PreparedRain<'a> {
 
 impl<'a> PreparedRain<'a> {
     pub(crate) fn new(rain: &'a Rain, view: &'a View, surroundings: &'a Surroundings) -> Self {
-        let shutter_state = ShutterState::new(rain, view, surroundings);
         let extinction = rain.extinction(view.shutter.middle());
         let lights = &surroundings.others.lights;
         let lighting = DropLighting { scattering: &rain.optics.scattering, lights, extinction: extinction.all };
         let sky_lighting = rain.skies.for_view(&rain.optics.phase_function, view, surroundings.sky);
-        let prepared_lights = lighting.prepare_lights(shutter_state.cameras.middle().position);
-        let frame = FrameInputs {
-            rain,
-            shutter_state: &shutter_state,
-            lighting: &lighting,
-            prepared_lights: &prepared_lights,
-            sky: &sky_lighting.coarse,
-            view,
-        };
-        let bounds = shutter_state.around_camera(1.1 * shutter_state.distance);
-        let mut billboards = 0;
+        let shutter_state = ShutterState::new(rain, view, surroundings);
         let mut textured = None;
-        let mut chunks = match rain.parameters.method {
-            Method::Drops => frame.projection(DropSelection::All).drop_chunks(&[bounds]),
-            Method::Billboards => {
-                let region = PerDropRegion::new(&shutter_state, lights);
-                let mut chunks = frame.projection(DropSelection::PerDrop(&region)).drop_chunks(region.spheres());
-                let projection = frame.projection(DropSelection::Billboard(&region));
-                let billboard_chunks =
-                    Billboards::new(projection, frame.culling_radiance(), frame.simplification()).chunks(bounds);
-                billboards = billboard_chunks.iter().map(|chunk| chunk.cell_count).sum();
-                chunks.extend(billboard_chunks);
-                chunks
+        let mut streaks = Streaks::default();
+        let parts = exposure_parts(view);
+        if rain.parameters.method == Method::Textures {
+            textured = TexturedBillboards::new(rain, &shutter_state, lights, view, culling_radiance(rain, view));
+        }
+        if let [_] = parts[..] {
+            streaks.add_part(rain, &shutter_state, &lighting, &sky_lighting.coarse, view);
+        } else {
+            let share = 1.0 / parts.len() as f64;
+            for part in &parts {
+                let shutter_state = ShutterState::of_part(rain, part, surroundings, parts.len());
+                streaks.add_part(rain, &shutter_state, &lighting, &sky_lighting.coarse, part);
             }
-            Method::Textures => {
-                textured = TexturedBillboards::new(rain, &shutter_state, lights, view, frame.culling_radiance());
-                billboards = textured.as_ref().map_or(0, TexturedBillboards::count);
-                Vec::new()
-            }
-        };
-        chunks.extend(frame.splashes());
+            streaks.drops *= share;
+            streaks.billboards *= share;
+        }
+        streaks.billboards += textured.as_ref().map_or(0.0, |textured| textured.count() as f64);
         let end = if rain.parameters.airlight_distance > 0.0 { rain.near_reach() } else { 0.0 };
         let farthest = rain.reach(surroundings);
         let unlit = DropLighting { lights: &[], ..lighting };
@@ -110,11 +98,11 @@ impl<'a> PreparedRain<'a> {
             farthest,
             &rain.lamp_scattering,
         );
-        let metadata = frame.metadata(chunks.iter().map(|chunk| chunk.drop_count).sum(), billboards);
+        let metadata = metadata(rain, view, streaks.drops, streaks.billboards);
         Self {
             view,
             level: bansho_base::math::simd::level(),
-            chunks,
+            chunks: streaks.chunks,
             streaks_end: rain.streaks_end(),
             textured,
             single_scattering,
@@ -123,7 +111,69 @@ impl<'a> PreparedRain<'a> {
     }
 }
 
-/// The inputs of a frame.
+/// Radiance below which the light of a streak is culled, cd/m^2.
+fn culling_radiance(rain: &Rain, view: &View) -> f32 {
+    let white = view.white_luminance.filter(|_| rain.parameters.culling);
+    white.map_or(0.0, |white| (white * CULLING_FRACTION) as f32)
+}
+
+/// Metadata of a frame.
+fn metadata(rain: &Rain, view: &View, drops: f64, billboards: f64) -> Vec<MetadataEntry> {
+    let t = view.shutter.middle();
+    let sizes = DropSizeDistribution::marshall_palmer(rain.rate(t));
+    let entry = |name, unit, value| MetadataEntry { name, unit, value };
+    vec![
+        entry("rain_rate", "mm/h", rain.rate(t)),
+        entry("drops_in_view", "", drops.round()),
+        entry("billboards_in_view", "", billboards.round()),
+        entry("extinction", "1/m", extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL)),
+        entry("visibility", "m", visibility(&sizes)),
+    ]
+}
+
+/// The streaks of a frame.
+#[derive(Default)]
+struct Streaks {
+    chunks: Vec<StreakChunk>,
+    /// Number of drops and of billboards that they stand for.
+    drops: f64,
+    billboards: f64,
+}
+
+impl Streaks {
+    /// Adds the streaks of one part of the exposure.
+    fn add_part(
+        &mut self,
+        rain: &Rain,
+        shutter_state: &ShutterState,
+        lighting: &DropLighting,
+        sky: &SkyOnDrops,
+        view: &View,
+    ) {
+        let prepared_lights = lighting.prepare_lights(shutter_state.cameras.middle().position);
+        let frame = FrameInputs { rain, shutter_state, lighting, prepared_lights: &prepared_lights, sky, view };
+        let bounds = shutter_state.around_camera(1.1 * shutter_state.distance);
+        let mut chunks = match rain.parameters.method {
+            Method::Drops => frame.projection(DropSelection::All).drop_chunks(&[bounds]),
+            Method::Billboards => {
+                let region = PerDropRegion::new(shutter_state, lighting.lights);
+                let mut chunks = frame.projection(DropSelection::PerDrop(&region)).drop_chunks(region.spheres());
+                let projection = frame.projection(DropSelection::Billboard(&region));
+                let billboard_chunks =
+                    Billboards::new(projection, culling_radiance(rain, view), frame.simplification()).chunks(bounds);
+                self.billboards += billboard_chunks.iter().map(|chunk| chunk.cell_count as f64).sum::<f64>();
+                chunks.extend(billboard_chunks);
+                chunks
+            }
+            Method::Textures => Vec::new(),
+        };
+        chunks.extend(frame.splashes());
+        self.drops += chunks.iter().map(|chunk| chunk.drop_count).sum::<f64>();
+        self.chunks.extend(chunks);
+    }
+}
+
+/// The inputs of a part of a frame.
 struct FrameInputs<'a> {
     rain: &'a Rain,
     shutter_state: &'a ShutterState,
@@ -168,26 +218,6 @@ impl<'a> FrameInputs<'a> {
         let white = self.view.white_luminance.filter(|_| codes > 0.0 && !self.view.aovs_requested)?;
         Some(StochasticSimplification { white, max_contribution: codes / 255.0 })
     }
-
-    /// Radiance below which the light of a streak is culled, cd/m^2.
-    fn culling_radiance(&self) -> f32 {
-        let white = self.view.white_luminance.filter(|_| self.rain.parameters.culling);
-        white.map_or(0.0, |white| (white * CULLING_FRACTION) as f32)
-    }
-
-    /// Metadata of the frame.
-    fn metadata(&self, drops: f64, billboards: usize) -> Vec<MetadataEntry> {
-        let t = self.view.shutter.middle();
-        let sizes = DropSizeDistribution::marshall_palmer(self.rain.rate(t));
-        let entry = |name, unit, value| MetadataEntry { name, unit, value };
-        vec![
-            entry("rain_rate", "mm/h", self.rain.rate(t)),
-            entry("drops_in_view", "", drops.round()),
-            entry("billboards_in_view", "", billboards as f64),
-            entry("extinction", "1/m", extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL)),
-            entry("visibility", "m", visibility(&sizes)),
-        ]
-    }
 }
 
 impl Prepared for PreparedRain<'_> {
@@ -195,7 +225,10 @@ impl Prepared for PreparedRain<'_> {
         self.metadata.clone()
     }
 
-    fn bounds(&self, _slice: &DepthInterval) -> Rect {
+    fn bounds(&self, slice: &DepthInterval) -> Rect {
+        if self.textured.is_none() && rounded_depth(slice.near) >= rounded_depth(slice.far) {
+            return Rect::default();
+        }
         Rect::from_size(self.view.size[0], self.view.size[1])
     }
 

@@ -6,7 +6,7 @@ use super::rasterize::{
     PackedStreak, StreakSegment,
     tile::{TILE_COLUMNS, TILE_ROWS},
 };
-use crate::shutter_cameras::PixelBounds;
+use crate::shutter_cameras::{PixelBounds, ShutterCameras};
 
 /// For each tile of a picture, the indices of the streaks that may touch it, in drawing order; stored as in a
 /// compressed sparse row matrix.
@@ -49,8 +49,8 @@ impl TileRange {
 /// The tiles of `tile_size` pixels each, along `length` pixels, that the interval `[low, high]` touches.
 #[inline(always)]
 fn touched_tiles([low, high]: [f32; 2], length: usize, tile_size: usize) -> [u16; 2] {
-    // NaN touches nothing.
-    if !(high >= 0.0 && low < length as f32) {
+    // NaN touches nothing. A picture without pixels has no tiles.
+    if length == 0 || !(high >= 0.0 && low < length as f32) {
         return [0, 0];
     }
     let (last, scale) = (((length - 1) / tile_size) as f32, 1.0 / tile_size as f32);
@@ -108,6 +108,8 @@ pub(crate) struct StreakChunk {
 pub(crate) struct StreakChunkBuilder {
     /// Columns and rows of the picture.
     size: [usize; 2],
+    /// Pixels after which a panorama repeats.
+    period: Option<f32>,
     streaks: Vec<PackedStreak>,
     ranges: Vec<TileRange>,
     /// Number of drops that each of the next streaks stands for.
@@ -117,16 +119,44 @@ pub(crate) struct StreakChunkBuilder {
 }
 
 impl StreakChunkBuilder {
-    /// An empty chunk for a picture of `size` pixels.
-    pub(crate) fn new(size: [usize; 2]) -> Self {
-        Self { size, streaks: Vec::new(), ranges: Vec::new(), drops_per_streak: 1.0, drop_count: 0.0, cell_count: 0 }
+    /// An empty chunk for the picture of some cameras.
+    pub(crate) fn new(cameras: &ShutterCameras) -> Self {
+        let (size, period) = (cameras.size(), cameras.period);
+        Self {
+            size,
+            period,
+            streaks: Vec::new(),
+            ranges: Vec::new(),
+            drops_per_streak: 1.0,
+            drop_count: 0.0,
+            cell_count: 0,
+        }
     }
 
     /// Adds a streak with its bounding box.
     #[inline(always)]
     pub(crate) fn add(&mut self, segment: &StreakSegment, extent: PixelBounds) {
+        if let Some(period) = self.period {
+            return self.add_repetitions(segment, extent, period);
+        }
+        self.add_once(segment, extent);
+    }
+
+    #[inline(always)]
+    fn add_once(&mut self, segment: &StreakSegment, extent: PixelBounds) {
         self.ranges.push(TileRange::new(extent, self.size, TILE_COLUMNS));
         self.streaks.push(PackedStreak::new(segment));
+    }
+
+    /// Adds a streak where a panorama shows it: one that crosses its seam, on both sides.
+    fn add_repetitions(&mut self, segment: &StreakSegment, [columns, rows]: PixelBounds, period: f32) {
+        for shift in [0.0, -period, period] {
+            let columns = columns.map(|column| column + shift);
+            if columns[1] > 0.0 && columns[0] < self.size[0] as f32 {
+                let repeated = StreakSegment { center: [segment.center[0] + shift, segment.center[1]], ..*segment };
+                self.add_once(&repeated, [columns, rows]);
+            }
+        }
     }
 
     /// Sets how many drops each streak stands for that is added to this cell.
@@ -206,5 +236,9 @@ mod tests {
         assert_eq!([0, 1].map(|tile_column| tile_rows.members(2, tile_column)), [[1, 5]; 2]);
         assert!(tile_rows.members(3, 0).is_empty() && tile_rows.members(0, 2).is_empty());
         assert!(TileBins::default().members(0, 0).is_empty());
+        let everywhere = TileRange::new([all, all], [32, 0], 32);
+        assert!(TileBins::new([32, 0], 32, &[everywhere]).members(0, 0).is_empty());
+        let in_one_row = TileRange::new([all, all], [32, 1], 32);
+        assert_eq!(TileBins::new([32, 1], 32, &[in_one_row]).members(0, 0), [0]);
     }
 }

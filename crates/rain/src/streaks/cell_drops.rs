@@ -2,16 +2,16 @@
 
 use bansho_base::math::{
     random::{self, Key, Purpose},
-    simd::LANES,
+    simd::{LANES, Real},
 };
 
 use crate::{
     drops::{
-        cell::CellState,
-        lattice::Cell,
+        cell::{CellState, DropStates},
+        lattice::LatticeCell,
         shutter_state::{DropClassState, ShutterState},
     },
-    lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min},
+    lanes::{LaneArray, Vec3Lanes, ZERO_LANES},
 };
 
 const COUNT: Purpose = Purpose::named("rain drops of a cell");
@@ -25,12 +25,14 @@ pub(crate) struct DropBatch {
     pub(crate) positions: Vec3Lanes,
     /// m/s.
     pub(crate) velocities: Vec3Lanes,
+    /// Offsets, x and z, when the shutter opens and when it closes, from where these velocities would take the drops, m; `None` for uniform motion.
+    pub(crate) bends: Option<[[LaneArray; 2]; 2]>,
     /// mm.
     pub(crate) diameter_mm: f32,
     /// Factor of the physical opacity.
     pub(crate) opacity_factor: f32,
     /// Fade-in weight, 0 to 1; 0 in unused lanes.
-    pub(crate) presence: Lanes,
+    pub(crate) presence: LaneArray,
 }
 
 /// The drops of one diameter in one cell.
@@ -50,7 +52,7 @@ pub(crate) struct CellDrops {
 
 impl CellDrops {
     #[inline(always)]
-    pub(crate) fn new(shutter_state: &ShutterState, class: &DropClassState, cell: Cell) -> Self {
+    pub(crate) fn new(shutter_state: &ShutterState, class: &DropClassState, cell: LatticeCell) -> Self {
         let key = shutter_state.key;
         let contents = class.lattice.contents(cell);
         let words = key.words(contents, 0, class.purpose(COUNT));
@@ -77,11 +79,11 @@ impl CellDrops {
         let [x, y, z, threshold] = self.key.uniforms_of_steps(self.contents, first as u32, self.purpose);
         let mut presence = ZERO_LANES;
         for i in 0..LANES {
-            let risen = fast_min(1.0, fast_max(0.0, (self.rising - threshold[i]) * (1.0 / FADE_IN) as f32));
+            let risen = ((self.rising - threshold[i]) * (1.0 / FADE_IN) as f32).simd_clamp01();
             presence[i] = if first + i < self.count { risen } else { 0.0 };
         }
-        let (positions, velocities) = self.state.drop_states(&[x, y, z]);
+        let DropStates { positions, velocities, bends } = self.state.drop_states(&[x, y, z]);
         let (diameter_mm, opacity_factor) = (self.diameter_mm, self.opacity_factor);
-        DropBatch { positions, velocities, diameter_mm, opacity_factor, presence }
+        DropBatch { positions, velocities, bends, diameter_mm, opacity_factor, presence }
     }
 }

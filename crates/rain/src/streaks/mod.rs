@@ -5,6 +5,7 @@ pub(crate) mod cell_drops;
 pub mod coverage;
 pub mod oscillation;
 pub(crate) mod project;
+pub(crate) mod project_curvilinear;
 pub(crate) mod project_lanes;
 pub(crate) mod rasterize;
 pub(crate) mod splashes;

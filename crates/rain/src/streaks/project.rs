@@ -2,7 +2,11 @@
 
 use bansho_base::{
     host::parallel::prelude::*,
-    math::{DVec3, random::Purpose, simd::LANES},
+    math::{
+        DVec3,
+        random::Purpose,
+        simd::{LANES, Real},
+    },
     phenomenon::surroundings::{Emitter, Light},
 };
 use fearless_simd::{Level, dispatch};
@@ -16,14 +20,15 @@ use super::{
 };
 use crate::{
     drops::{
-        lattice::{CELL_SIZE, Cell},
+        lattice::{CELL_SIZE, LatticeCell},
         shutter_state::{DropClassState, ShutterState, Sphere, VisibleCell},
     },
-    lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, smoothstep},
+    lanes::{LaneArray, Vec3Lanes, ZERO_LANES, smoothstep},
     lighting::{
         drop_lighting::{DropLighting, PreparedLight},
         sky::SkyOnDrops,
     },
+    shutter_cameras::ShutterCameras,
 };
 
 const OSCILLATION: Purpose = Purpose::named("rain drop oscillation");
@@ -46,6 +51,20 @@ pub(crate) struct StreakProjection<'a> {
     pub(crate) selection: DropSelection<'a>,
 }
 
+impl VisibleStreaks {
+    /// Whether any drop may be seen.
+    #[inline(always)]
+    pub(crate) fn any(&self) -> bool {
+        self.streaks.any_visible() || self.streaks.any_pieces()
+    }
+
+    /// Whether the drop of a lane is seen, whole or in pieces.
+    pub(crate) fn is_seen(&self, i: usize, cameras: &ShutterCameras) -> bool {
+        let count = self.streaks.pieces[i] as usize;
+        self.streaks.visible[i] != 0 || count > 0 && self.paths.pieces(i, count, cameras).streaks.any_visible()
+    }
+}
+
 /// Weights of drops: near drops are drawn one by one, others on billboards.
 #[derive(Clone, Copy)]
 pub(crate) enum DropSelection<'a> {
@@ -60,7 +79,7 @@ pub(crate) enum DropSelection<'a> {
 /// Streaks of sixteen drops, and how they were weighted.
 pub(crate) struct VisibleStreaks {
     /// Weights of the drops, 0 to 1: presence, and what the selection and the distance from the camera leave of it.
-    pub(crate) weights: Lanes,
+    pub(crate) weights: LaneArray,
     /// Paths, clipped at the ground.
     pub(crate) paths: DropPaths,
     pub(crate) streaks: StreakBatch,
@@ -92,14 +111,23 @@ impl DropSelection<'_> {
                 paths.to[axis][i] += travel;
             }
         }
+        if let Some([open, close]) = &drops.bends {
+            for (side, axis) in [(0, 0), (1, 2)] {
+                for i in 0..LANES {
+                    paths.from[axis][i] += open[side][i];
+                    paths.to[axis][i] += close[side][i];
+                }
+            }
+        }
         let eye = shutter_state.cameras.middle().position;
         paths.clip_at_ground((shutter_state.ground - eye.y) as f32);
         let mut streaks = paths.streaks(&shutter_state.cameras);
         if shutter_state.has_occluders() {
             for i in 0..LANES {
                 let [position, velocity] = [&drops.positions, &drops.velocities].map(|vectors| vector(vectors, i));
-                if streaks.visible[i] != 0 && shutter_state.is_sheltered(eye + position, velocity) {
-                    streaks.visible[i] = 0;
+                let is_seen = streaks.visible[i] != 0 || streaks.pieces[i] > 0;
+                if is_seen && shutter_state.is_sheltered(eye + position, velocity) {
+                    (streaks.visible[i], streaks.pieces[i]) = (0, 0);
                 }
             }
         }
@@ -108,7 +136,7 @@ impl DropSelection<'_> {
 
     /// Weights of drops at positions relative to the camera.
     #[inline(always)]
-    fn weights(&self, positions: &Vec3Lanes) -> Lanes {
+    fn weights(&self, positions: &Vec3Lanes) -> LaneArray {
         let mut weights = [1.0; LANES];
         match self {
             Self::All => {}
@@ -142,9 +170,9 @@ impl StreakProjection<'_> {
         half_width: f64,
         add: impl Fn(&DropClassState, &VisibleCell, &mut StreakChunkBuilder) + Sync,
     ) -> Vec<StreakChunk> {
-        let size = self.shutter_state.cameras.size();
+        let cameras = &self.shutter_state.cameras;
         map_cell_chunks(self.shutter_state, within, half_width, |cells| {
-            let mut builder = StreakChunkBuilder::new(size);
+            let mut builder = StreakChunkBuilder::new(cameras);
             for (visible, class) in cells {
                 builder.add_cell(|builder| add(class, visible, builder));
             }
@@ -154,7 +182,7 @@ impl StreakProjection<'_> {
 
     /// Adds the streaks of a cell, drop by drop.
     #[inline(always)]
-    fn add_cell(&self, class: &DropClassState, cell: Cell, builder: &mut StreakChunkBuilder) {
+    fn add_cell(&self, class: &DropClassState, cell: LatticeCell, builder: &mut StreakChunkBuilder) {
         let drops = CellDrops::new(self.shutter_state, class, cell);
         for first in (0..drops.count()).step_by(LANES) {
             self.add_drops(&drops.batch(first), 0.0, builder);
@@ -165,22 +193,43 @@ impl StreakProjection<'_> {
     #[inline(always)]
     pub(crate) fn add_drops(&self, drops: &DropBatch, min_peak: f32, builder: &mut StreakChunkBuilder) {
         let VisibleStreaks { paths, streaks, .. } = self.selection.visible_streaks(self.shutter_state, drops);
-        self.add_streaks(&streaks, &drops.positions, &paths.diameter_mm, min_peak, builder);
+        self.add_paths(&paths, &streaks, &drops.positions, min_peak, builder);
     }
 
-    /// Lights and adds the visible streaks of drops at some positions.
+    /// Lights and adds the visible `streaks` of the paths of drops, which are at some positions at the middle of the exposure.
     #[inline(always)]
-    pub(crate) fn add_streaks(
+    pub(crate) fn add_paths(
         &self,
+        paths: &DropPaths,
         streaks: &StreakBatch,
         positions: &Vec3Lanes,
-        diameters_mm: &Lanes,
         min_peak: f32,
         builder: &mut StreakChunkBuilder,
     ) {
-        if !streaks.any_visible() {
-            return;
+        if streaks.any_visible() {
+            self.add_streaks(streaks, positions, &paths.diameter_mm, None, min_peak, builder);
         }
+        if streaks.any_pieces() {
+            for i in (0..LANES).filter(|i| streaks.pieces[*i] > 0) {
+                let pieces = paths.pieces(i, streaks.pieces[i] as usize, &self.shutter_state.cameras);
+                let drop = PiecesOf { position: [0, 1, 2].map(|axis| positions[axis][i]), count: pieces.count };
+                let diameters_mm = [paths.diameter_mm[i]; LANES];
+                self.add_streaks(&pieces.streaks, &pieces.positions, &diameters_mm, Some(drop), min_peak, builder);
+            }
+        }
+    }
+
+    /// Lights and adds the visible streaks of drops at some positions, or of the pieces of the path of one drop.
+    #[inline(always)]
+    fn add_streaks(
+        &self,
+        streaks: &StreakBatch,
+        positions: &Vec3Lanes,
+        diameters_mm: &LaneArray,
+        pieces_of: Option<PiecesOf>,
+        min_peak: f32,
+        builder: &mut StreakChunkBuilder,
+    ) {
         let mut lit = ZERO_LANES;
         for i in 0..LANES {
             lit[i] = if streaks.peak[i] >= min_peak { 1.0 } else { 0.0 };
@@ -196,8 +245,9 @@ impl StreakProjection<'_> {
             let mut segment = streaks.segment(i, diameters_mm[i], radiance[i]);
             let sky = self.sky.map_or([0.0; 3], |sky| sky.tiles.at(&sky.radiance, segment.center));
             if self.oscillation > 0.0 {
-                let position = [0, 1, 2].map(|axis| positions[axis][i]);
-                self.add_speckled(&segment, sky, position, builder);
+                let whole = PiecesOf { position: [0, 1, 2].map(|axis| positions[axis][i]), count: 1 };
+                let (drop, piece) = pieces_of.map_or((whole, 0), |drop| (drop, i));
+                self.add_speckled(&segment, sky, drop, piece, builder);
                 continue;
             }
             if self.sky.is_some() {
@@ -207,31 +257,40 @@ impl StreakProjection<'_> {
         }
     }
 
-    /// Adds a streak whose drop oscillates: in the light of lamps and fires its pieces are brighter and darker. The sky lights a drop from all sides, so
-    /// its shape changes little there.
+    /// Adds a streak whose drop oscillates, one of the pieces of its path: in the light of lamps and fires its parts are brighter and darker. The sky lights
+    /// a drop from all sides, so its shape changes little there.
     fn add_speckled(
         &self,
         segment: &StreakSegment,
         sky: [f32; 3],
-        position: [f32; 3],
+        drop: PiecesOf,
+        piece: usize,
         builder: &mut StreakChunkBuilder,
     ) {
-        let exposure = self.shutter_state.cameras.exposure_time;
-        let words = position.map(f32::to_bits);
+        let exposure = self.shutter_state.cameras.exposure_time / drop.count as f64;
+        let words = drop.position.map(f32::to_bits);
         let id = u64::from(words[0]) << 32 | u64::from(words[1]);
         let phases = self.shutter_state.key.uniforms(id, words[2], OSCILLATION);
         let oscillation = Oscillation::new(segment.diameter_mm.into(), self.oscillation, [phases[0], phases[1]]);
         let count = oscillation.piece_count(exposure, segment.length());
         for index in 0..count {
-            let [from, to] = [index, index + 1].map(|step| exposure * step as f64 / count as f64);
+            let [from, to] = [index, index + 1].map(|step| exposure * (piece as f64 + step as f64 / count as f64));
             let brightness = oscillation.mean_brightness(from, to) as f32;
-            let mut piece = segment.piece(index, count);
-            piece.shading.light = segment.shading.light.map(|light| light * brightness);
-            piece.shading.add_light(sky);
-            let extent = piece.extent();
-            builder.add(&piece, extent);
+            let mut part = segment.piece(index, count);
+            part.shading.light = segment.shading.light.map(|light| light * brightness);
+            part.shading.add_light(sky);
+            let extent = part.extent();
+            builder.add(&part, extent);
         }
     }
+}
+
+/// A drop whose path is cut into pieces.
+#[derive(Clone, Copy)]
+struct PiecesOf {
+    /// At the middle of the exposure, relative to the camera, m.
+    position: [f32; 3],
+    count: usize,
 }
 
 /// Maps all cells that may be visible within some spheres, nearest cells first and a chunk of cells at a time. Drops are
@@ -323,13 +382,13 @@ impl PerDropRegion {
 
     /// Weights of drops at positions relative to the camera, 0 to 1.
     #[inline(always)]
-    pub(super) fn weights(&self, [xs, ys, zs]: &Vec3Lanes) -> Lanes {
+    pub(super) fn weights(&self, [xs, ys, zs]: &Vec3Lanes) -> LaneArray {
         let mut weights = ZERO_LANES;
         for &SphereF32 { center: [x, y, z], radius } in &self.from_camera {
             for i in 0..LANES {
                 let offset = [xs[i] - x, ys[i] - y, zs[i] - z];
                 let distance = (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt();
-                weights[i] = fast_max(weights[i], smoothstep((radius - distance) * (1.0 / FADE_WIDTH) as f32));
+                weights[i] = smoothstep((radius - distance) * (1.0 / FADE_WIDTH) as f32).simd_max(weights[i]);
             }
         }
         weights

@@ -2,13 +2,19 @@
 //!
 //! Positions are relative to the camera at the middle of the exposure, which keeps single precision sufficient.
 
-use bansho_base::{camera::Lens, math::simd::LANES};
+use bansho_base::{
+    camera::Lens,
+    math::simd::{LANES, Real},
+};
 
-use super::rasterize::{ScreenPath, StreakSegment, tile::Shading};
+use super::rasterize::{ScreenPath, StreakSegment, tile::StreakShading};
 use crate::{
-    lanes::{Lanes, Vec3Lanes, ZERO_LANES, fast_max, fast_min},
+    lanes::{LaneArray, Vec3Lanes, ZERO_LANES},
     shutter_cameras::{PUPIL_RADIUS, PixelBounds, ShutterCameras},
 };
+
+/// Largest factor by which a perspective lens stretches the area of a sphere: that of the widest field of view, at its corners.
+const MAX_STRETCH: f32 = 100.0;
 
 /// Paths of drops while the shutter is open.
 pub(crate) struct DropPaths {
@@ -17,9 +23,9 @@ pub(crate) struct DropPaths {
     /// Positions when it closes, m.
     pub(crate) to: Vec3Lanes,
     /// mm.
-    pub(crate) diameter_mm: Lanes,
+    pub(crate) diameter_mm: LaneArray,
     /// Opacity gain; 0 for no streak.
-    pub(crate) gain: Lanes,
+    pub(crate) gain: LaneArray,
 }
 
 impl DropPaths {
@@ -28,8 +34,8 @@ impl DropPaths {
     pub(crate) fn clip_at_ground(&mut self, ground: f32) {
         for i in 0..LANES {
             let (fall, over) = (self.from[1][i] - self.to[1][i], self.from[1][i] - ground);
-            let falling = fast_min(1.0, over / fall);
-            let fraction = fast_max(0.0, if fall > 0.0 { falling } else { over.signum() });
+            let falling = (over / fall).simd_min(1.0);
+            let fraction = (if fall > 0.0 { falling } else { over.signum() }).simd_max(0.0);
             for axis in 0..3 {
                 self.to[axis][i] = (self.to[axis][i] - self.from[axis][i]) * fraction + self.from[axis][i];
             }
@@ -40,10 +46,12 @@ impl DropPaths {
     /// The streaks in the picture, without light.
     #[inline(always)]
     pub(crate) fn streaks(&self, cameras: &ShutterCameras) -> StreakBatch {
-        let [open, center, close] = &cameras.projectors;
+        let [open, _, close] = &cameras.projectors;
+        if cameras.middle().lens != Lens::Perspective {
+            return self.curvilinear_streaks(cameras);
+        }
         // A clipped path ends before the shutter closes; the camera's motion within that time is neglected.
         let (from, to) = (open.project(&self.from), close.project(&self.to));
-        let perspective = center.lens() == Lens::Perspective;
         let mut streaks = StreakBatch::NONE;
         for i in 0..LANES {
             let depth = 0.5 * (from.depth[i] + to.depth[i]);
@@ -53,7 +61,7 @@ impl DropPaths {
             let distance =
                 0.5 * (path_sum[0] * path_sum[0] + path_sum[1] * path_sum[1] + path_sum[2] * path_sum[2]).sqrt();
             // Perspective stretches spheres away from the optical axis into ellipses of a larger area.
-            let stretch = if perspective { fast_min(10.0, fast_max(1.0, distance / depth)) } else { 1.0 };
+            let stretch = (distance / depth).simd_max(1.0).simd_min(MAX_STRETCH);
             let ends = [[from.x[i], from.y[i]], [to.x[i], to.y[i]]];
             let blocked_area = std::f32::consts::PI * radius * radius * stretch * self.gain[i];
             let segment = StreakSegment::new(
@@ -61,7 +69,7 @@ impl DropPaths {
                 depth,
                 0.0,
             );
-            streaks.set_lane(i, &segment, self.gain[i], cameras.window);
+            streaks.set_lane(i, &segment, self.gain[i], cameras);
         }
         streaks
     }
@@ -70,31 +78,33 @@ impl DropPaths {
 /// Radius of the defocus blur of a lens focused at one meter for nearer drops, m at their depth. The blocked area is
 /// unchanged, the opacity lower.
 #[inline(always)]
-fn defocus_radius(depth: f32) -> f32 {
+pub(super) fn defocus_radius(depth: f32) -> f32 {
     /// Focus distance, m.
     const FOCUS: f32 = 1.0;
-    PUPIL_RADIUS * fast_max(0.0, 1.0 - depth * (1.0 / FOCUS))
+    PUPIL_RADIUS * (1.0 - depth * (1.0 / FOCUS)).simd_max(0.0)
 }
 
 /// Streaks of sixteen drops, as a structure of arrays.
 pub(crate) struct StreakBatch {
-    center: [Lanes; 2],
+    center: [LaneArray; 2],
     steep: [u32; LANES],
-    half_length: Lanes,
-    slope: Lanes,
-    half_width: Lanes,
-    line_coverage: Lanes,
-    depth: Lanes,
+    half_length: LaneArray,
+    slope: LaneArray,
+    half_width: LaneArray,
+    line_coverage: LaneArray,
+    depth: LaneArray,
     /// Bounding boxes: left, right, top and bottom.
-    bounds: [Lanes; 4],
+    bounds: [LaneArray; 4],
     /// Maximum opacity.
-    pub(crate) peak: Lanes,
+    pub(crate) peak: LaneArray,
     /// 1 for visible streaks, 0 for others.
     pub(crate) visible: [u32; LANES],
+    /// Number of [pieces](DropPaths::pieces) into which a path is cut; 0 for a path that is not. These are not drawn as streaks.
+    pub(crate) pieces: [u32; LANES],
 }
 
 impl StreakBatch {
-    const NONE: Self = Self {
+    pub(super) const NONE: Self = Self {
         center: [ZERO_LANES; 2],
         steep: [0; LANES],
         half_length: ZERO_LANES,
@@ -105,10 +115,11 @@ impl StreakBatch {
         bounds: [ZERO_LANES; 4],
         peak: ZERO_LANES,
         visible: [0; LANES],
+        pieces: [0; LANES],
     };
 
     #[inline(always)]
-    fn set_lane(&mut self, i: usize, segment: &StreakSegment, gain: f32, window: PixelBounds) {
+    pub(super) fn set_lane(&mut self, i: usize, segment: &StreakSegment, gain: f32, cameras: &ShutterCameras) {
         let StreakSegment { center, steep, half_length, slope, half_width, line_coverage, shading, .. } = *segment;
         (self.center[0][i], self.center[1][i]) = (center[0], center[1]);
         (self.steep[i], self.half_length[i], self.slope[i]) = (u32::from(steep), half_length, slope);
@@ -116,9 +127,15 @@ impl StreakBatch {
         self.peak[i] = segment.peak();
         let [[left, right], [top, bottom]] = segment.extent();
         (self.bounds[0][i], self.bounds[1][i], self.bounds[2][i], self.bounds[3][i]) = (left, right, top, bottom);
-        let [columns, rows] = window;
+        let [columns, rows] = cameras.window;
         // Positions outside the picture are NaN, and every comparison with NaN is false.
-        let meets = (right > columns[0]) & (left < columns[1]) & (bottom > rows[0]) & (top < rows[1]);
+        let mut meets = (right > columns[0]) & (left < columns[1]);
+        if let Some(period) = cameras.period {
+            for shift in [-period, period] {
+                meets |= (right + shift > columns[0]) & (left + shift < columns[1]);
+            }
+        }
+        meets &= (bottom > rows[0]) & (top < rows[1]);
         self.visible[i] = u32::from(meets & (gain > 0.0));
     }
 
@@ -128,6 +145,16 @@ impl StreakBatch {
         let mut any = 0;
         for i in 0..LANES {
             any |= self.visible[i];
+        }
+        any != 0
+    }
+
+    /// Whether any path is cut into pieces.
+    #[inline(always)]
+    pub(crate) fn any_pieces(&self) -> bool {
+        let mut any = 0;
+        for i in 0..LANES {
+            any |= self.pieces[i];
         }
         any != 0
     }
@@ -155,7 +182,7 @@ impl StreakBatch {
             half_width: self.half_width[i],
             line_coverage: self.line_coverage[i],
             diameter_mm,
-            shading: Shading { light, depth: self.depth[i] },
+            shading: StreakShading { light, depth: self.depth[i] },
         }
     }
 }

@@ -101,7 +101,7 @@ impl Splashes<'_> {
         };
         let squares: Vec<&[i64; 2]> = squares.iter().filter(is_visible).collect();
         let chunk = |squares: &[&[i64; 2]]| {
-            let mut builder = StreakChunkBuilder::new(shutter_state.cameras.size());
+            let mut builder = StreakChunkBuilder::new(&shutter_state.cameras);
             squares.iter().for_each(|square| self.square(**square, middle(**square), &mut builder));
             builder.build()
         };
@@ -172,7 +172,7 @@ impl Splashes<'_> {
         let positions = position.map(|coordinate| [coordinate; LANES]);
         dispatch!(level, _simd => {
             let streaks = paths.streaks(&shutter_state.cameras);
-            self.projection.add_streaks(&streaks, &positions, &paths.diameter_mm, 0.0, builder);
+            self.projection.add_paths(&paths, &streaks, &positions, 0.0, builder);
         });
     }
 

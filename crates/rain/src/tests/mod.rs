@@ -2,6 +2,8 @@
 
 mod agreement;
 mod drops;
+mod exposure;
+mod lens;
 mod light;
 mod motion;
 pub(crate) mod reference;
@@ -17,7 +19,7 @@ use bansho_base::{
         surroundings::{Emitter, Light, Publication, Surroundings},
     },
     world::{
-        sky::{Sky, SkyKind, SkyParameters},
+        sky::{Sky, SkyKind},
         wind::{Wind, WindParameters},
     },
 };
@@ -88,7 +90,7 @@ pub(super) fn opacity(strip: &Strip) -> Vec<f32> {
 
 pub(super) fn lit(wind: &Wind) -> Surroundings<'_> {
     let lights = vec![lamp([0.8, 3.0, -3.0], 500.0)];
-    let sky = SkyParameters { luminance: 20.0.into(), ..SkyParameters::default() }.at(0.0);
+    let sky = Sky::new(SkyKind::Overcast, 20.0, 7000.0);
     Surroundings { sky, others: Publication { lights, ..Publication::default() }, ..Surroundings::from_wind(wind) }
 }
 
@@ -254,11 +256,13 @@ fn any_rain_gives_finite_pictures() {
         bansho_base::camera::Lens::Panorama,
     ];
     let mut drawn = 0;
-    for (exposure, speed) in [(1.0, 40.0), (1e-5, 40.0), (0.0, 0.0), (1.0 / 60.0, 0.0)] {
+    for (exposure, speed) in [(0.1, 40.0), (1e-5, 40.0), (0.0, 0.0), (1.0 / 60.0, 0.0)] {
         for lens in lenses {
             for method in METHODS {
                 let wind = wind([speed, 0.0, -0.5 * speed], 0.5);
-                let rain = rain(RainParameters { rate_mm_per_h: 300.0.into(), method, ..RainParameters::default() }, 2);
+                let parameters =
+                    RainParameters { rate_mm_per_h: 300.0.into(), method, distance: 5.0, ..RainParameters::default() };
+                let rain = rain(parameters, 2);
                 let mut view = view_at(2.0, exposure, [48, 27]);
                 view.camera_parameters.lens = lens;
                 let view = View::new(view.camera_parameters, view.shutter, 2.1, view.size, 0);
@@ -283,7 +287,7 @@ fn diameters_must_ascend() {
 #[test]
 fn rain_shows_against_dark_and_vanishes_against_an_even_sky() {
     let wind = wind([0.0; 3], 0.0);
-    let sky = SkyParameters { kind: SkyKind::Uniform, luminance: 100.0.into(), ..SkyParameters::default() }.at(0.0);
+    let sky = Sky::new(SkyKind::Uniform, 100.0, 7000.0);
     let surroundings = Surroundings { sky, ..Surroundings::from_wind(&wind) };
     let mut view = view_at(1.0, 0.02, [96, 54]);
     // Half way up, where hardly any drop shows the ground.

@@ -1,17 +1,21 @@
 //! The billboards of a frame: where they are, how they are lit, and their pixels.
 
-use std::f64::consts::PI;
+use std::{
+    f64::consts::{FRAC_PI_2, PI, TAU},
+    ops::RangeInclusive,
+};
 
 use bansho_base::{
+    camera::{Camera, Lens},
     image::Rect,
-    math::{DVec2, DVec3},
+    math::{self, DVec2, DVec3},
     phenomenon::{
         strip::{DepthInterval, GrayPlanes, Strip, View},
         surroundings::Light,
     },
 };
 
-use super::texture_set::Texture;
+use super::texture_set::StreakTexture;
 use crate::{Rain, aovs::write_aovs, drops::shutter_state::ShutterState};
 
 /// Edge of a voxel and of a billboard, m.
@@ -32,7 +36,7 @@ pub(super) struct Quad<'a> {
     pub(super) center: DVec3,
     /// Horizontal unit vector across it.
     pub(super) right: DVec3,
-    texture: &'a Texture,
+    texture: &'a StreakTexture,
     /// Mipmap.
     level: usize,
     diameter_mm: f32,
@@ -44,17 +48,31 @@ pub(super) struct Quad<'a> {
     bounds: Rect,
 }
 
-/// Height of the centers of billboards that fall with `speed` (m/s) in `rows` voxels above the ground, at time `t`, m. Each falls until it is in the ground, and
-/// then returns to the top.
-pub(super) fn heights(rows: usize, speed: f64, t: f64) -> impl Iterator<Item = f64> {
+/// Height of the centers of billboards that fall with `speed` (m/s) in `rows` voxels above the ground, at time `t`, m: those within a range. Each falls until it
+/// is in the ground, and then returns to the top.
+pub(super) fn heights(rows: i64, speed: f64, t: f64, range: RangeInclusive<f64>) -> impl Iterator<Item = f64> {
     let fallen = speed * t / VOXEL;
-    (0..rows).map(move |row| ((row as f64 + 1.0 - fallen).rem_euclid(rows as f64) - 0.5) * VOXEL)
+    // The camera may be a thousand kilometers above the ground: only rows that come into the range are looked at. One more on each side, for rounding.
+    let row = |height: f64| height / VOXEL - 0.5 + fallen;
+    let first = (row(*range.start()).floor() as i64).saturating_sub(1);
+    let last = (row(*range.end()).ceil() as i64).saturating_add(1);
+    let mut candidates: Vec<i64> =
+        (first..=last.min(first.saturating_add(rows - 1))).map(|row| row.rem_euclid(rows)).collect();
+    candidates.sort_unstable();
+    let height = move |row: i64| ((row as f64 + 1.0 - fallen).rem_euclid(rows as f64) - 0.5) * VOXEL;
+    candidates.into_iter().map(height).filter(move |height| range.contains(height))
 }
 
 impl<'a> Quad<'a> {
     /// A billboard at `center`, turned about the vertical so that it is perpendicular to the horizontal part of the line from the camera, and lit at its
     /// corners: the illuminance of each light falls with the square of the distance.
-    pub(super) fn new(center: DVec3, diameter_mm: f32, texture: &'a Texture, lights: &[Light], view: &View) -> Self {
+    pub(super) fn new(
+        center: DVec3,
+        diameter_mm: f32,
+        texture: &'a StreakTexture,
+        lights: &[Light],
+        view: &View,
+    ) -> Self {
         let toward = center - view.camera.position;
         let right = DVec3::new(-toward.z, 0.0, toward.x).normalize_or(DVec3::X);
         let corner = |index: usize| {
@@ -78,7 +96,7 @@ impl<'a> Quad<'a> {
             diameter_mm,
             depth,
             radiance,
-            bounds: pixel_bounds(&corners, view),
+            bounds: pixel_bounds(center, &corners, view),
         }
     }
 
@@ -87,18 +105,74 @@ impl<'a> Quad<'a> {
     }
 }
 
-/// The pixels between the corners of a billboard; all of them if a corner is beside or behind the camera.
-fn pixel_bounds(corners: &[DVec3; 4], view: &View) -> Rect {
-    let whole = Rect::from_size(view.size[0], view.size[1]);
+/// The pixels that a billboard may cover.
+fn pixel_bounds(center: DVec3, corners: &[DVec3; 4], view: &View) -> Rect {
+    let camera = &view.camera;
+    let bounds = match camera.lens {
+        Lens::Perspective => bounds_of_corners(corners, camera),
+        Lens::Fisheye => bounds_in_fisheye(center, camera),
+        Lens::Panorama => bounds_in_panorama(center, camera),
+    };
+    let Some([low, high]) = bounds else { return Rect::from_size(view.size[0], view.size[1]) };
+    let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
+    let [x, y] = [clamp(low.x.floor(), view.size[0]), clamp(low.y.floor(), view.size[1])];
+    let [right, bottom] = [clamp(high.x.ceil(), view.size[0]), clamp(high.y.ceil(), view.size[1])];
+    Rect { x, y, width: right - x, height: bottom - y }
+}
+
+/// Of the pixels between the corners, the first and the last column and row; `None` if a corner is beside or behind the camera.
+fn bounds_of_corners(corners: &[DVec3; 4], camera: &Camera) -> Option<[DVec2; 2]> {
     let mut bounds = [DVec2::INFINITY, DVec2::NEG_INFINITY];
     for corner in corners {
-        let Some(projection) = view.camera.project(*corner) else { return whole };
-        bounds = [bounds[0].min(projection.pixel), bounds[1].max(projection.pixel)];
+        let pixel = camera.project(*corner)?.pixel;
+        bounds = [bounds[0].min(pixel), bounds[1].max(pixel)];
     }
-    let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-    let [x, y] = [clamp(bounds[0].x.floor(), view.size[0]), clamp(bounds[0].y.floor(), view.size[1])];
-    let [right, bottom] = [clamp(bounds[1].x.ceil(), view.size[0]), clamp(bounds[1].y.ceil(), view.size[1])];
-    Rect { x, y, width: right - x, height: bottom - y }
+    Some(bounds)
+}
+
+/// Angle of the cone around the line of sight to the center of a billboard in which it is, radians; `None` around the camera.
+fn cone_angle(center: DVec3, camera: &Camera) -> Option<f64> {
+    let sine = std::f64::consts::FRAC_1_SQRT_2 * VOXEL / (center - camera.position).length();
+    (sine < 0.99).then(|| math::asin(sine))
+}
+
+/// In a fisheye the edges of a billboard bend outward.
+fn bounds_in_fisheye(center: DVec3, camera: &Camera) -> Option<[DVec2; 2]> {
+    /// Angle from the axis from which on circles around the center are too wide to be bounded by a box.
+    const MAX_ANGLE: f64 = 2.0;
+    let (cone, local) = (cone_angle(center, camera)?, camera.point_in_camera(center));
+    let across = math::hypot(local.x, local.y);
+    let angle = math::atan2(across, -local.z);
+    let farthest = angle + cone;
+    if farthest > MAX_ANGLE {
+        return None;
+    }
+    let direction = if across > 0.0 { DVec2::new(local.x, -local.y) / across } else { DVec2::ZERO };
+    let pixel = camera.principal_point + direction * (angle * camera.focal_pixels);
+    // Within the cone the lens stretches lengths by no more than this.
+    let reach = cone * camera.focal_pixels * farthest / math::sin(farthest);
+    Some([pixel - reach, pixel + reach])
+}
+
+/// In a panorama a billboard above or below the camera is all around, and one across its seam at both sides.
+fn bounds_in_panorama(center: DVec3, camera: &Camera) -> Option<[DVec2; 2]> {
+    let (cone, local) = (cone_angle(center, camera)?, camera.point_in_camera(center));
+    let latitude = math::asin((local.y / local.length()).clamp(-1.0, 1.0));
+    let longitude = math::atan2(local.x, -local.z);
+    let [left, right] = [camera.principal_point.x, camera.size[0] - camera.principal_point.x];
+    let ratio = math::sin(cone) / math::cos(latitude);
+    let is_around =
+        latitude.abs() + cone >= FRAC_PI_2 - 1e-6 || ratio >= 1.0 || left.max(right) > 1.01 * PI * camera.focal_pixels;
+    let half_width = if is_around { TAU } else { math::asin(ratio) };
+    let crosses_seam = longitude.abs() + half_width > PI;
+    let [mut low, mut high] = [-1.0, 1.0].map(|side| {
+        let angles = DVec2::new(longitude + side * half_width, side * cone - latitude);
+        camera.principal_point + angles * camera.focal_pixels
+    });
+    if crosses_seam {
+        (low.x, high.x) = (0.0, camera.size[0].ceil());
+    }
+    Some([low, high])
 }
 
 impl<'a> TexturedBillboards<'a> {
@@ -115,11 +189,12 @@ impl<'a> TexturedBillboards<'a> {
         let opacity_of_code = set.opacity_of_code() * rain.parameters.opacity_gain as f32;
         let eye = view.camera.position;
         let (distance, ground) = (shutter_state.distance, shutter_state.ground);
-        let rows = ((eye.y - ground).abs() + distance).ceil().max(1.0) as usize;
+        let rows = ((eye.y - ground).abs() + distance).ceil().max(1.0) as i64;
+        let near = eye.y - ground - distance..=eye.y - ground + distance;
         let range = |center: f64| (center - distance).floor() as i64..=(center + distance).floor() as i64;
         let mut quads = Vec::new();
         for (class, texture) in shutter_state.classes.iter().zip(set.of_rate(rain.rate(t))) {
-            let heights: Vec<f64> = heights(rows, class.speed, t).collect();
+            let heights: Vec<f64> = heights(rows, class.speed, t, near.clone()).collect();
             for (x, z) in range(eye.x).flat_map(|x| range(eye.z).map(move |z| (x, z))) {
                 for height in &heights {
                     let center = DVec3::new((x as f64 + 0.5) * VOXEL, ground + height, (z as f64 + 0.5) * VOXEL);

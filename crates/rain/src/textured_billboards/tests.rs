@@ -62,14 +62,23 @@ fn mipmaps_keep_the_mean_of_a_texture() {
 
 #[test]
 fn billboards_fall_and_return_to_the_top() {
-    let at = |t: f64| -> Vec<f64> { heights(7, 4.0, t).collect() };
+    let everywhere = f64::NEG_INFINITY..=f64::INFINITY;
+    let at = |t: f64| -> Vec<f64> { heights(7, 4.0, t, everywhere.clone()).collect() };
     assert_eq!(at(0.0), [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, -0.5]);
     // After 0.1 s all have fallen by 0.4 m, but for the one that was in the ground, which is near the top.
     for (before, after) in at(0.0).iter().zip(at(0.1)) {
         let expected = if *before < 0.0 { before - 0.4 + 7.0 } else { before - 0.4 };
         assert!((after - expected).abs() < 1e-12, "{before} {after}");
     }
-    assert!(heights(7, 4.0, 123.4).all(|height| (-0.5..6.5).contains(&height)));
+    assert!(at(123.4).iter().all(|height| (-0.5..6.5).contains(height)));
+    // Those within a range are those of all that are in it, however high the camera is above the ground.
+    for t in [0.0, 0.1, 123.4] {
+        let near: Vec<f64> = heights(7, 4.0, t, 1.2..=3.9).collect();
+        let expected: Vec<f64> = at(t).into_iter().filter(|height| (1.2..=3.9).contains(height)).collect();
+        assert_eq!(near, expected, "{t} s");
+        let high: Vec<f64> = heights(1_000_000_000_000, 4.0, t, 1e9 - 2.0..=1e9 + 2.0).collect();
+        assert!(high.len() == 4 || high.len() == 5, "{t} s: {high:?}");
+    }
 }
 
 #[test]

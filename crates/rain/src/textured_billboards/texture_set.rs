@@ -19,14 +19,14 @@ pub(crate) const EXPOSURE: f64 = 1.0 / 30.0;
 pub struct TextureSet {
     rates: Vec<f64>,
     /// By rate, then by diameter.
-    textures: Vec<Vec<Texture>>,
+    textures: Vec<Vec<StreakTexture>>,
     /// Opacity of the largest code.
     scale: f32,
 }
 
 /// One texture: codes from 0 to 255, and mipmaps of half the size each.
 #[derive(Debug)]
-pub(crate) struct Texture {
+pub(crate) struct StreakTexture {
     codes: Vec<u8>,
     size: usize,
     /// Means of codes, times 256.
@@ -54,7 +54,8 @@ impl TextureSet {
             .collect::<Result<_, StreakTextureError>>()?;
         let values = pictures.iter().flatten().flat_map(|picture| picture.pixels().as_flattened());
         let scale = values.copied().fold(f32::MIN_POSITIVE, f32::max);
-        let textures = pictures.iter().map(|row| row.iter().map(|picture| Texture::new(picture, scale)).collect());
+        let textures =
+            pictures.iter().map(|row| row.iter().map(|picture| StreakTexture::new(picture, scale)).collect());
         Ok(Self { rates: parameters.texture_rates_mm_per_h.clone(), textures: textures.collect(), scale })
     }
 
@@ -69,7 +70,7 @@ impl TextureSet {
     }
 
     /// The textures of the rate nearest to `rate` (mm/h), by diameter; none without rain.
-    pub(crate) fn of_rate(&self, rate: f64) -> &[Texture] {
+    pub(crate) fn of_rate(&self, rate: f64) -> &[StreakTexture] {
         let distance = |index: &usize| (self.rates[*index] - rate).abs();
         let nearest = (0..self.rates.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
         nearest.filter(|_| rate > 0.0).map_or(&[], |index| &self.textures[index])
@@ -81,7 +82,7 @@ impl TextureSet {
     }
 }
 
-impl Texture {
+impl StreakTexture {
     fn new(picture: &Image<1>, scale: f32) -> Self {
         let code = |opacity: &f32| (opacity / scale * 255.0 + 0.5) as u8;
         let codes: Vec<u8> = picture.pixels().as_flattened().iter().map(code).collect();

@@ -28,6 +28,8 @@ pub(crate) struct Background<'a> {
 struct RefractingAir<'a> {
     deflection: Deflection<'a>,
     focal_pixels: f32,
+    /// Whether the picture goes on at its other side: a whole panorama.
+    is_periodic: bool,
 }
 
 impl<'a> Background<'a> {
@@ -44,7 +46,13 @@ impl<'a> Background<'a> {
 
     /// The same background seen through air with this deflection.
     pub(crate) fn through(self, deflection: Deflection<'a>, view: &View) -> Self {
-        Self { air: Some(RefractingAir { deflection, focal_pixels: view.camera.focal_pixels as f32 }), ..self }
+        let width = view.size[0] as f64;
+        let is_periodic =
+            width >= 2.0 && view.camera.horizontal_period().is_some_and(|period| (period - width).abs() < 0.5);
+        Self {
+            air: Some(RefractingAir { deflection, focal_pixels: view.camera.focal_pixels as f32, is_periodic }),
+            ..self
+        }
     }
 
     /// Depths in a row of `rect`, m. Refraction does not change them.
@@ -165,7 +173,7 @@ impl Blend for [f32; 4] {
 struct BentPixel {
     /// Index of the upper left pixel.
     first: u32,
-    /// One bit for each of the four, in rows: set where the value straight behind is used instead.
+    /// One bit for each of the four, in rows: set where the value straight behind is used instead. And [`AROUND_SEAM`].
     hidden: u32,
     /// Position between the four, 0 to 1: to the right, down.
     fractions: [f32; 2],
@@ -173,6 +181,8 @@ struct BentPixel {
 
 /// All four pixels are hidden.
 const ALL_HIDDEN: u32 = 0b1111;
+/// The right two of the four pixels are in the first column of a panorama, the left two in the last.
+const AROUND_SEAM: u32 = 0b1_0000;
 
 impl BentPixel {
     /// The value at the origin, for the pixel with the index `own_index` of a picture that is `width` pixels wide.
@@ -185,12 +195,21 @@ impl BentPixel {
             return upper[0].blend(upper[1], across).blend(lower[0].blend(lower[1], across), down);
         }
         let straight = values[own_index];
-        if self.hidden == ALL_HIDDEN {
+        if self.hidden & ALL_HIDDEN == ALL_HIDDEN {
             return straight;
         }
-        let at = |corner: u32, index: usize| if self.hidden >> corner & 1 == 0 { values[index] } else { straight };
-        let upper = at(0, first).blend(at(1, first + 1), across);
-        upper.blend(at(2, first + width).blend(at(3, first + width + 1), across), down)
+        let corners = self.corners(width);
+        let at = |corner: usize| if self.hidden >> corner & 1 == 0 { values[corners[corner]] } else { straight };
+        let upper = at(0).blend(at(1), across);
+        upper.blend(at(2).blend(at(3), across), down)
+    }
+
+    /// Indices of the four pixels.
+    #[inline(always)]
+    fn corners(&self, width: usize) -> [usize; 4] {
+        let first = self.first as usize;
+        let right = if self.hidden & AROUND_SEAM == 0 { first + 1 } else { first + 1 - width };
+        [first, right, first + width, right + width]
     }
 }
 
@@ -221,20 +240,21 @@ impl RefractingAir<'_> {
     /// The origin of the light of a pixel that is deflected by the angles `[right, up]`; `reach` converts radians into pixels at the background.
     #[inline(always)]
     fn origin(&self, x: usize, y: usize, [right, up]: [f32; 2], reach: f32, [width, height]: [usize; 2]) -> BentPixel {
-        let (column, across) = split(reach.fma(right, x as f32), width);
+        let across = reach.fma(right, x as f32);
+        let (column, across) = if self.is_periodic { split_around(across, width) } else { split(across, width) };
         let (row, down) = split((-reach).fma(up, y as f32), height);
         // A picture of one column or row has no neighbors in that direction.
         let beside = if width < 2 { 0b1010 } else { 0 } | if height < 2 { 0b1100 } else { 0 };
-        let hidden = if right == 0.0 && up == 0.0 { ALL_HIDDEN } else { beside };
+        let seam = if self.is_periodic && column as usize + 1 == width { AROUND_SEAM } else { 0 };
+        let hidden = if right == 0.0 && up == 0.0 { ALL_HIDDEN } else { beside | seam };
         BentPixel { first: row * width as u32 + column, hidden, fractions: [across, down] }
     }
 
     /// Bits of those of the four pixels that are nearer than the air, through which their light cannot come.
     #[inline(always)]
     fn nearer_than_air(&self, pixel: &BentPixel, depth: &[f32], width: usize) -> u32 {
-        let first = pixel.first as usize;
         let mut nearer = 0;
-        for (corner, index) in [first, first + 1, first + width, first + width + 1].into_iter().enumerate() {
+        for (corner, index) in pixel.corners(width).into_iter().enumerate() {
             let is_nearer = depth.get(index).is_some_and(|depth| *depth < self.deflection.depth as f32);
             nearer |= u32::from(is_nearer) << corner;
         }
@@ -250,6 +270,15 @@ fn split(coordinate: f32, side: usize) -> (u32, f32) {
     (approximations::round_to_i32(whole).cast_unsigned(), coordinate - whole)
 }
 
+/// The same for a coordinate that is periodic: the integer part may be that of the last pixel, which the first follows.
+#[inline(always)]
+fn split_around(coordinate: f32, side: usize) -> (u32, f32) {
+    let side = side as f32;
+    let coordinate = coordinate - (coordinate / side).floor() * side;
+    let whole = coordinate.floor().max(0.0).min(side - 1.0);
+    (approximations::round_to_i32(whole).cast_unsigned(), (coordinate - whole).min(1.0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -260,7 +289,7 @@ mod tests {
         let angles = Image::filled(3, 2, angle);
         let deflection = Deflection { depth: 2.0, rect: Rect::from_size(3, 2), angle: &angles };
         let mut row = [BentPixel::default(); 3];
-        RefractingAir { deflection, focal_pixels: 1.0 }.trace_row(0, y, [3, 2], depth, &mut row);
+        RefractingAir { deflection, focal_pixels: 1.0, is_periodic: false }.trace_row(0, y, [3, 2], depth, &mut row);
         row[x].read(&values, 3 * y + x, 3)
     }
 
@@ -273,13 +302,26 @@ mod tests {
     }
 
     #[test]
+    fn light_of_a_whole_panorama_is_bent_across_its_seam() {
+        let values = [0.0, 1.0, 2.0, 10.0, 11.0, 12.0];
+        for (angle, x, expected) in [(1.0, 2, 10.0), (0.5, 2, 11.0), (-0.75, 0, 11.5), (-1.0, 0, 12.0), (4.0, 1, 12.0)]
+        {
+            let angles = Image::filled(3, 2, [angle, 0.0]);
+            let deflection = Deflection { depth: 2.0, rect: Rect::from_size(3, 2), angle: &angles };
+            let mut row = [BentPixel::default(); 3];
+            RefractingAir { deflection, focal_pixels: 1.0, is_periodic: true }.trace_row(0, 1, [3, 2], None, &mut row);
+            assert_eq!(row[x].read(&values, 3 + x, 3), expected, "{angle} at {x}");
+        }
+    }
+
+    #[test]
     fn pictures_of_one_column_or_row_bend_along_it() {
         for (size, angle) in [([1, 3], [0.0, -0.5]), ([3, 1], [0.5, 0.0])] {
             let angles = Image::filled(size[0], size[1], angle);
             let deflection = Deflection { depth: 2.0, rect: Rect::from_size(size[0], size[1]), angle: &angles };
             let mut bent = BentPixels::default();
             let color = Image::from_pixels(size[0], size[1], [1.0, 2.0, 4.0].map(|v| [v; 4]).to_vec()).unwrap();
-            let air = Some(RefractingAir { deflection, focal_pixels: 1.0 });
+            let air = Some(RefractingAir { deflection, focal_pixels: 1.0, is_periodic: false });
             let background = Background { color: Some(&color), depth: None, channels: &[], air };
             background.trace(Rect::from_size(size[0], size[1]), &mut bent);
             let seen = background.plane(&[1.0, 2.0, 4.0], Rect::from_size(size[0], size[1]), &bent, size[0]);
@@ -292,7 +334,7 @@ mod tests {
         let angles = Image::filled(1, 1, [1.0, 0.0]);
         let deflection = Deflection { depth: 2.0, rect: Rect { x: 1, y: 1, width: 1, height: 1 }, angle: &angles };
         let color = Image::from_pixels(3, 2, (0..6_u8).map(|v| [f32::from(v); 4]).collect()).unwrap();
-        let air = Some(RefractingAir { deflection, focal_pixels: 1.0 });
+        let air = Some(RefractingAir { deflection, focal_pixels: 1.0, is_periodic: false });
         let background = Background { color: Some(&color), depth: None, channels: &[], air };
         let (mut bent, mut buffer) = (BentPixels::default(), Vec::new());
         let rect = Rect { x: 0, y: 0, width: 3, height: 2 };

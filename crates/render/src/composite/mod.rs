@@ -14,4 +14,4 @@ pub(crate) mod refraction;
 pub(crate) mod slices;
 pub(crate) mod strips;
 
-pub(crate) use plate_light::plate_light;
+pub(crate) use plate_light::{plate_light, plate_light_remark};

@@ -118,7 +118,7 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
             let mut sum = [0.0_f32; 4];
             for row in &rows {
                 for column in &columns[x] {
-                    let color = premultiplied(alpha, picture.color.at(column.pixel, row.pixel));
+                    let color = alpha.premultiplied(picture.color.at(column.pixel, row.pixel));
                     for c in 0..4 {
                         sum[c] += row.weight * column.weight * color[c];
                     }
@@ -130,21 +130,8 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
     image
 }
 
-/// The values of a pixel multiplied by its alpha, between which pixels are interpolated.
-pub(crate) fn premultiplied(alpha: PictureAlpha, [r, g, b, a]: [f32; 4]) -> [f32; 4] {
-    match alpha {
-        PictureAlpha::Straight(_) => [r * a, g * a, b * a, a],
-        PictureAlpha::Opaque | PictureAlpha::Associated => [r, g, b, a],
-    }
-}
-
 /// Exposed ACEScg of a pixel over black, and its coverage, from values multiplied by alpha.
-pub(crate) fn over_black(
-    view: &color::View,
-    encoding: Encoding,
-    alpha: PictureAlpha,
-    [r, g, b, coverage]: [f32; 4],
-) -> [f32; 4] {
+fn over_black(view: &color::View, encoding: Encoding, alpha: PictureAlpha, [r, g, b, coverage]: [f32; 4]) -> [f32; 4] {
     let linear = |color: [f32; 3]| to_scene(view, encoding, color);
     let encoded = [r, g, b];
     let [r, g, b] = match alpha {
@@ -192,7 +179,7 @@ fn coverage_of_encoded_alpha(values: [f32; 3], alpha: f32) -> f32 {
 }
 
 /// Exposed ACEScg of the values of a plate. The view transform is inverted, so that a plate made for display is displayed unchanged.
-pub(crate) fn to_scene(view: &color::View, encoding: Encoding, color: [f32; 3]) -> [f32; 3] {
+fn to_scene(view: &color::View, encoding: Encoding, color: [f32; 3]) -> [f32; 3] {
     match encoding {
         Encoding::DisplaySrgb => view.to_scene(color.map(color::decode_srgb)),
         Encoding::LinearSrgb => color::acescg_from_srgb(color),
@@ -237,14 +224,37 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_veil_covers_as_much_of_mid_gray_as_where_it_was_painted() {
-        // A black veil of half: encoded 0.5 becomes 0.25, light 0.2140 becomes 0.0509, so 76.2 % are covered.
+    fn an_overlay_covers_as_much_of_mid_gray_as_where_it_was_painted() {
+        // A black overlay with alpha 0.5: encoded 0.5 becomes 0.25, light 0.2140 becomes 0.0509, so 76.2 % are covered.
         assert!((coverage_of_encoded_alpha([0.0; 3], 0.5) - 0.7622).abs() < 1e-3);
-        // A mid-gray veil changes nothing: its light 0.0509 and the rest of 0.2140.
+        // A mid-gray overlay changes nothing: its light 0.0509 and the rest of 0.2140.
         assert!((coverage_of_encoded_alpha([0.25; 3], 0.5) - 0.2378).abs() < 1e-3);
         // Half white is brighter there than its light alone could be: nothing is covered.
         assert!(coverage_of_encoded_alpha([0.5; 3], 0.5) < 1e-3);
         assert_eq!([0.0, 1.0].map(|alpha| coverage_of_encoded_alpha([0.0; 3], alpha)), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn the_light_of_a_plate_is_what_is_drawn_of_it_whatever_its_alpha() {
+        use crate::plate_boxes::PlateBoxes;
+        let view = color::View::DISPLAY;
+        for encoding in [Encoding::DisplaySrgb, Encoding::LinearSrgb, Encoding::LinearAcescg] {
+            for alpha in [
+                PictureAlpha::Opaque,
+                PictureAlpha::Associated,
+                PictureAlpha::Straight(AlphaConvention::Encoded),
+                PictureAlpha::Straight(AlphaConvention::Linear),
+            ] {
+                let pixel = [0.3, 0.25, 0.2, if alpha == PictureAlpha::Opaque { 1.0 } else { 0.4 }];
+                let picture = Picture::opaque(Image::filled(3, 2, pixel), encoding);
+                let boxes = PlateBoxes::new(&picture, alpha, &view);
+                let drawn = over_black(&view, encoding, alpha, alpha.premultiplied(pixel));
+                for each in boxes.iter() {
+                    let near = each.light.iter().zip(drawn).all(|(own, drawn)| (own - drawn).abs() < 1e-4);
+                    assert!(near, "{encoding:?} {alpha:?}: {:?} is drawn {drawn:?}", each.light);
+                }
+            }
+        }
     }
 
     #[test]

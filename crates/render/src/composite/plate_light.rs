@@ -1,46 +1,48 @@
 //! The light in which a plate was taken, estimated from the plate itself. Drops in front of a plate refract it.
 
 use bansho_base::{
-    camera::{Camera, Lens},
+    camera::Camera,
     color,
-    host::assets::Encoding,
+    host::plural::counted,
     math::{self, DVec2},
     world::sky::{ElevationProfile, ElevationSample},
 };
 
-use super::plate::{PlateMapping, over_black, premultiplied};
-use crate::{compiled::CompiledScene, plan::Plan};
-
-/// Samples along a plate's longer side.
-const SAMPLES: usize = 256;
-/// Largest luminance that is taken from a photograph, relative to display white. How much brighter a clipped pixel was is unknown.
-const CLIPPED_LUMINANCE: f32 = 2.0;
+use super::plate::PlateMapping;
+use crate::{compiled::CompiledScene, plan::Plan, plate_boxes::BRIGHTEST_LUMINANCE};
 
 /// The light from all elevations, as the plate of the first frame shows it through the camera at time 0; 1.0 is display white. `None`
 /// where there is no plate, or none that can be read.
 ///
-/// It is computed once a shot, so that it does not flicker, and from the whole plate, whatever the crop.
+/// It is computed once a shot, so that it does not flicker, and from the whole plate, whatever the crop: from the means of its boxes.
 pub(crate) fn plate_light(compiled: &CompiledScene, plan: &Plan) -> Option<ElevationProfile> {
-    let picture = compiled.plate_image()?;
-    let alpha = plan.scene.plate.alpha_of(&picture);
+    let boxes = compiled.plate_boxes(plan.view_transform())?;
     let camera = plan.camera.at(0.0, plan.size);
-    let [width, height] = [picture.color.width(), picture.color.height()];
-    let mapping = PlateMapping::new(plan, [width, height]);
-    let view = plan.view_transform();
-    let step = width.max(height).div_ceil(SAMPLES);
-    let positions = |side: usize| (step.min(side) / 2..side).step_by(step);
-    let samples: Vec<_> = positions(height)
-        .flat_map(|y| positions(width).map(move |x| [x, y]))
-        .filter_map(|[x, y]| {
-            let pixel = DVec2::new(mapping.picture_position(0, x), mapping.picture_position(1, y));
-            let [red, green, blue, _] =
-                over_black(&view, picture.encoding, alpha, premultiplied(alpha, picture.color.at(x, y)));
-            let light = [red, green, blue];
-            sample(&camera, pixel, limited(picture.encoding, light))
+    let mapping = PlateMapping::new(plan, boxes.size());
+    let samples: Vec<_> = boxes
+        .iter()
+        .filter_map(|each| {
+            let [x, y] = [0, 1].map(|axis| mapping.picture_position(axis, each.center[axis]));
+            let sample = sample(&camera, DVec2::new(x, y), each.light)?;
+            Some(ElevationSample { weight: sample.weight * each.pixels as f64 / boxes.pixels_in_box(), ..sample })
         })
         .collect();
     let above = open_sky(&samples);
     ElevationProfile::from_samples(samples.into_iter().chain(above))
+}
+
+/// What to say of the plate's light: `None` if all of it is taken.
+pub(crate) fn plate_light_remark(compiled: &CompiledScene, plan: &Plan) -> Option<String> {
+    // A sky that the scene states lights it instead.
+    let boxes = plan.scene.tables.sky(0.0).is_none().then(|| compiled.plate_boxes(plan.view_transform()))??;
+    (boxes.limited > 0).then(|| {
+        let pixels = counted(boxes.limited, "pixel");
+        let (verb, takes) = if boxes.limited == 1 { ("is", "counts") } else { ("are", "count") };
+        format!(
+            "`image`: {pixels} {verb} infinite or far brighter than the rest, and {takes} in the light on drops as {BRIGHTEST_LUMINANCE} times display white or \
+             the plate's own brightness; a [[light]] states the lamp, or a [sky] the sky"
+        )
+    })
 }
 
 /// Fraction of the upper half of a plate, the brightest, that is assumed to be sky.
@@ -75,29 +77,14 @@ fn open_sky(samples: &[ElevationSample]) -> Vec<ElevationSample> {
 /// The light of a pixel, with the sine of its elevation and its solid angle as the weight.
 fn sample(camera: &Camera, pixel: DVec2, radiance: [f32; 3]) -> Option<ElevationSample> {
     let direction = camera.direction(pixel)?;
-    let length = direction.length();
-    let weight = match camera.lens {
-        Lens::Perspective => 1.0 / (length * length * length),
-        Lens::Fisheye => 1.0,
-        Lens::Panorama => math::cos((camera.principal_point.y - pixel.y) / camera.focal_pixels).max(0.0),
-    };
-    Some(ElevationSample { sine: direction.y / length, weight, radiance })
-}
-
-/// Light without negative values, and for display pictures at most [`CLIPPED_LUMINANCE`].
-fn limited(encoding: Encoding, light: [f32; 3]) -> [f32; 3] {
-    let light = light.map(|value| value.max(0.0));
-    let brightest = color::luminance(light);
-    let factor = match encoding {
-        Encoding::DisplaySrgb if brightest > CLIPPED_LUMINANCE => CLIPPED_LUMINANCE / brightest,
-        _ => 1.0,
-    };
-    light.map(|value| value * factor)
+    // Relative to the pixel at the principal point, since the samples of the open sky are weighted in this unit.
+    let weight = camera.pixel_solid_angle(pixel) * camera.focal_pixels * camera.focal_pixels;
+    Some(ElevationSample { sine: direction.y / direction.length(), weight, radiance })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{super::plate::to_scene, *};
+    use super::*;
 
     #[test]
     fn the_sky_above_a_plate_is_as_bright_as_the_sky_in_it_and_brighter_overhead() {
@@ -127,12 +114,18 @@ mod tests {
     }
 
     #[test]
-    fn white_of_a_photograph_is_at_most_one_stop_brighter_than_white() {
-        let white = to_scene(&color::View::DISPLAY, Encoding::DisplaySrgb, [1.0; 3]);
-        assert!(color::luminance(white) > 10.0);
-        let [limited_white, light] = [Encoding::DisplaySrgb, Encoding::LinearAcescg].map(|kind| limited(kind, white));
-        assert!((color::luminance(limited_white) - CLIPPED_LUMINANCE).abs() < 1e-5);
-        assert_eq!(light, white);
-        assert_eq!(limited(Encoding::LinearAcescg, [-0.1, 0.5, 0.2]), [0.0, 0.5, 0.2]);
+    fn every_lens_weighs_a_plate_by_the_solid_angle_of_its_pixels() {
+        use bansho_base::camera::{CameraParameters, Lens};
+        for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
+            let camera = CameraParameters { lens, ..CameraParameters::default() }.at(0.0, [128, 128]);
+            let weight = |pixel| sample(&camera, pixel, [1.0; 3]).unwrap().weight;
+            let ray = |x: f64, y: f64| camera.direction(DVec2::new(x, y)).unwrap().normalize();
+            for [x, y] in [[64.0, 64.0], [64.0, 3.0], [32.5, 110.0]] {
+                let parallelogram = (ray(x + 0.5, y) - ray(x - 0.5, y)).cross(ray(x, y + 0.5) - ray(x, y - 0.5));
+                let expected = parallelogram.length() * camera.focal_pixels * camera.focal_pixels;
+                let ratio = weight(DVec2::new(x, y)) / expected;
+                assert!((ratio - 1.0).abs() < 1e-3, "{lens:?} at {x}, {y}: {ratio}");
+            }
+        }
     }
 }

@@ -10,14 +10,17 @@ pub(crate) struct Slice {
     pub(crate) members: Vec<usize>,
 }
 
-/// Largest number of slices. With more, the thinnest neighbors are merged.
-const MAX_SLICES: usize = 24;
+/// Largest number of slices that cut an interval, so that a phenomenon is drawn in parts. With more, the thinnest neighbors are merged.
+const MAX_CUTS: usize = 24;
+/// Largest number of slices.
+const MAX_SLICES: usize = 256;
 
 /// Slices from near to far, cut wherever a phenomenon begins or ends.
 ///
 /// `intervals[i]` are the intervals that phenomenon `i` fills. Neighboring slices with the same members are separate only where another
-/// phenomenon begins or ends between them.
-pub(crate) fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
+/// phenomenon begins or ends between them. Members of a slice are sorted from near to far and, at equal depth, by name: the picture must not depend on the
+/// order of the scene's tables. `names[i]` is `None` for what is shared by the scene (lamps, obstacles, ground, sky), which follows all others in its order.
+pub(crate) fn cut(intervals: &[Vec<DepthInterval>], names: &[Option<&str>]) -> Vec<Slice> {
     let intervals: Vec<Vec<DepthInterval>> =
         intervals.iter().map(|filled| filled.iter().map(thickened).collect()).collect();
     let intervals = intervals.as_slice();
@@ -36,10 +39,40 @@ pub(crate) fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
         .filter(|slice| !slice.members.is_empty())
         .collect();
     merge_lone_neighbors(&mut slices);
-    while slices.len() > MAX_SLICES {
-        merge_thinnest(&mut slices);
-    }
+    merge_to_limit(&mut slices, MAX_CUTS, |slice| cuts_an_interval(intervals, slice));
+    merge_to_limit(&mut slices, MAX_SLICES, |_| true);
+    slices.iter_mut().for_each(|slice| sort_members(slice, intervals, names));
     slices
+}
+
+/// Whether a member of a slice goes on before or behind it: then it is drawn in several slices, which costs more than one.
+fn cuts_an_interval(intervals: &[Vec<DepthInterval>], slice: &Slice) -> bool {
+    let is_cut = |interval: &DepthInterval| {
+        interval.overlaps(&slice.interval) && (interval.near < slice.interval.near || interval.far > slice.interval.far)
+    };
+    slice.members.iter().any(|&member| intervals[member].iter().any(is_cut))
+}
+
+/// Sorts the members of a slice by the mean depth of those of their intervals that overlap it.
+///
+/// Gas, for example, is drawn in layers, each at the middle of its interval, which another phenomenon may have cut.
+fn sort_members(slice: &mut Slice, intervals: &[Vec<DepthInterval>], names: &[Option<&str>]) {
+    /// Depth at which intervals without end are cut off, m: far behind everything.
+    const END: f64 = 1e12;
+    let interval = slice.interval;
+    let depth = |member: usize| {
+        let overlapping = intervals[member].iter().filter(|own| own.overlaps(&interval));
+        let (sum, count) = overlapping
+            .fold((0.0, 0.0), |(sum, count), own| (sum + 0.5 * (own.near.max(-END) + own.far.min(END)), count + 1.0));
+        sum / f64::max(count, 1.0)
+    };
+    if slice.members.len() < 2 {
+        return;
+    }
+    slice.members.sort_by(|&a, &b| match (names[a], names[b]) {
+        (Some(name), Some(other)) => depth(a).total_cmp(&depth(b)).then_with(|| name.cmp(other)),
+        (own, other) => own.is_none().cmp(&other.is_none()).then(a.cmp(&b)),
+    });
 }
 
 /// An interval of positive length. A sheet that faces the camera has a single depth; its interval becomes the shortest possible.
@@ -63,17 +96,29 @@ fn merge_lone_neighbors(slices: &mut Vec<Slice>) {
     });
 }
 
-fn merge_thinnest(slices: &mut Vec<Slice>) {
-    let width = |pair: &[Slice]| (pair[1].interval.far - pair[0].interval.near) / pair[1].interval.far.max(1e-9);
-    let thinnest =
-        slices.windows(2).enumerate().min_by(|(_, a), (_, b)| width(a).total_cmp(&width(b))).map(|(index, _)| index);
-    let Some(index) = thinnest else { return };
-    let next = slices.remove(index + 1);
-    let merged = &mut slices[index];
-    merged.interval.far = next.interval.far;
-    merged.members.extend(next.members);
-    merged.members.sort_unstable();
-    merged.members.dedup();
+/// Merges the thinnest neighbors until no more than `limit` slices are counted.
+fn merge_to_limit(slices: &mut Vec<Slice>, limit: usize, is_counted: impl Fn(&Slice) -> bool) {
+    let mut counted: Vec<bool> = slices.iter().map(&is_counted).collect();
+    let mut count = counted.iter().filter(|counted| **counted).count();
+    while count > limit {
+        let width = |pair: &[Slice]| (pair[1].interval.far - pair[0].interval.near) / pair[1].interval.far.max(1e-9);
+        // At least one of them is counted, so that each merger gets nearer to the limit or leaves it as it is with fewer slices.
+        let pairs = slices.windows(2).zip(counted.windows(2)).enumerate();
+        let thinnest = pairs
+            .filter(|(_, (_, counted))| counted[0] || counted[1])
+            .min_by(|(_, (a, _)), (_, (b, _))| width(a).total_cmp(&width(b)))
+            .map(|(index, _)| index);
+        let Some(index) = thinnest else { return };
+        let next = slices.remove(index + 1);
+        count -= [counted[index], counted.remove(index + 1)].into_iter().filter(|counted| *counted).count();
+        let merged = &mut slices[index];
+        merged.interval.far = next.interval.far;
+        merged.members.extend(next.members);
+        merged.members.sort_unstable();
+        merged.members.dedup();
+        counted[index] = is_counted(merged);
+        count += usize::from(counted[index]);
+    }
 }
 
 #[cfg(test)]
@@ -84,12 +129,19 @@ mod tests {
         DepthInterval { near, far }
     }
 
+    /// The slices of phenomena that are named in the order of their indices.
+    fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
+        let names: Vec<String> = (0..intervals.len()).map(|i| format!("{i:05}")).collect();
+        let names: Vec<Option<&str>> = names.iter().map(|name| Some(name.as_str())).collect();
+        super::cut(intervals, &names)
+    }
+
     #[test]
     fn rain_is_cut_where_the_flame_stands() {
         let slices = cut(&[vec![interval(0.0, 50.0)], vec![interval(3.0, 4.0)]]);
         let expected = [
             Slice { interval: interval(0.0, 3.0), members: vec![0] },
-            Slice { interval: interval(3.0, 4.0), members: vec![0, 1] },
+            Slice { interval: interval(3.0, 4.0), members: vec![1, 0] },
             Slice { interval: interval(4.0, 50.0), members: vec![0] },
         ];
         assert_eq!(slices, expected);
@@ -106,19 +158,64 @@ mod tests {
     fn a_sheet_without_thickness_has_a_slice_of_its_own() {
         let slices = cut(&[vec![interval(0.0, 50.0)], vec![interval(3.0, 3.0)]]);
         assert_eq!(slices.len(), 3);
-        assert!(slices[1].interval.contains(3.0) && slices[1].members == [0, 1]);
+        assert!(slices[1].interval.contains(3.0) && slices[1].members == [1, 0]);
     }
 
     #[test]
     fn a_thousand_edges_come_to_a_bounded_number_of_slices_that_miss_nobody() {
-        let many: Vec<Vec<DepthInterval>> =
-            (0..500).map(|i| vec![interval(f64::from(i) * 0.1, f64::from(i) * 0.1 + 0.05)]).collect();
-        let slices = cut(&many);
-        assert!(slices.len() <= MAX_SLICES);
-        let mut seen: Vec<usize> = slices.iter().flat_map(|slice| slice.members.clone()).collect();
-        seen.sort_unstable();
-        seen.dedup();
-        assert_eq!(seen.len(), 500);
-        assert!(slices.windows(2).all(|pair| pair[0].interval.far <= pair[1].interval.near));
+        let crowd = || (0..500).map(|i| vec![interval(f64::from(i) * 0.1, f64::from(i) * 0.1 + 0.05)]);
+        let rain = vec![interval(0.0, 100.0)];
+        for (many, limit) in [(crowd().collect::<Vec<_>>(), MAX_SLICES), (crowd().chain([rain]).collect(), MAX_CUTS)] {
+            let slices = cut(&many);
+            assert!(slices.len() <= limit, "{}", slices.len());
+            let mut seen: Vec<usize> = slices.iter().flat_map(|slice| slice.members.clone()).collect();
+            seen.sort_unstable();
+            seen.dedup();
+            assert_eq!(seen.len(), many.len());
+            assert!(slices.windows(2).all(|pair| pair[0].interval.far <= pair[1].interval.near));
+        }
+    }
+
+    /// Names of the members of the slices, from near to far.
+    fn names_from_near_to_far(tables: &[(&'static str, Vec<DepthInterval>)]) -> Vec<Vec<&'static str>> {
+        let intervals: Vec<Vec<DepthInterval>> = tables.iter().map(|(_, filled)| filled.clone()).collect();
+        let names: Vec<Option<&str>> =
+            tables.iter().map(|(name, _)| (!["ground", "sky"].contains(name)).then_some(*name)).collect();
+        let members = |slice: Slice| slice.members.iter().map(|&member| tables[member].0).collect();
+        super::cut(&intervals, &names).into_iter().map(members).collect()
+    }
+
+    #[test]
+    fn slices_and_their_members_do_not_depend_on_the_order_of_tables() {
+        // Two gases whose layers interleave, two sheets at one depth, one a little farther, and rain; the ground stays last.
+        let tables = [
+            ("gas", vec![interval(2.0, 2.4), interval(2.4, 2.8)]),
+            ("more gas", vec![interval(2.1, 2.5), interval(2.5, 2.9)]),
+            ("b", vec![interval(3.0, 3.0)]),
+            ("a", vec![interval(3.0, 3.0)]),
+            ("behind", vec![interval(3.01, 3.01)]),
+            ("rain", vec![interval(0.05, 50.0)]),
+            ("ground", vec![interval(0.0, 1e5)]),
+        ];
+        let expected = names_from_near_to_far(&tables);
+        let mut swapped = tables.clone();
+        swapped[..6].reverse();
+        assert_eq!(names_from_near_to_far(&swapped), expected);
+        swapped[..6].rotate_left(2);
+        assert_eq!(names_from_near_to_far(&swapped), expected);
+        let position = |names: &[&str]| expected.iter().position(|members| members == names);
+        assert!(
+            position(&["gas", "more gas", "rain", "ground"]).is_some(),
+            "the middle of a layer counts: {expected:?}"
+        );
+        let [at, behind] = [position(&["a", "b", "rain", "ground"]), position(&["behind", "rain", "ground"])];
+        assert!(at.is_some() && at < behind, "{expected:?}");
+    }
+
+    #[test]
+    fn hundreds_of_sheets_without_rain_are_not_merged() {
+        let [odd, even] = [0, 1].map(|first| (0..60).map(move |i| f64::from(2 * i + first) * 0.01 + 1.0));
+        let [odd, even] = [odd, even].map(|depths| depths.map(|depth| interval(depth, depth)).collect::<Vec<_>>());
+        assert_eq!(cut(&[odd, even]).len(), 120);
     }
 }

@@ -5,11 +5,11 @@ use bansho_base::{
     math::{DVec2, DVec3},
     parameters::Auto,
     phenomenon::surroundings::Light,
+    tables::LevelGround,
 };
 
 use crate::{compiled::CompiledScene, plan::Plan};
-use bansho_environment::ground::GroundParameters;
-use bansho_scene::{LightParameters, Scene};
+use bansho_scene::Scene;
 
 /// Luminance of the bright regions of a phenomenon at automatic exposure, relative to display white: high enough that a core is nearly white,
 /// low enough that its edges keep their color.
@@ -79,7 +79,7 @@ fn automatic(plan: &Plan, brightest: f64) -> f64 {
 
 /// Luminance of the scene's own sky at the zenith, cd/m^2.
 fn stated_sky(scene: &Scene) -> f64 {
-    scene.sky.as_ref().map_or(0.0, |sky| f64::from(luminance(sky.at(0.0).radiance(DVec3::Y))))
+    scene.tables.sky(0.0).map_or(0.0, |stated| f64::from(luminance(stated.sky.radiance(DVec3::Y))))
 }
 
 /// Luminance, cd/m^2, of ground and air that the scene's own lights light: the quantile that [`BRIGHTEST_FRACTION`] of the lines of sight
@@ -88,7 +88,7 @@ fn stated_sky(scene: &Scene) -> f64 {
 /// Measured in the first, the middle and the last frame, along lines of sight that are the same for every size and crop.
 fn lit_luminance(plan: &Plan) -> f64 {
     let scene = plan.scene();
-    if scene.lights.is_empty() {
+    if scene.tables.lights(0.0).next().is_none() {
         return 0.0;
     }
     let frames = plan.frames();
@@ -102,21 +102,21 @@ fn lit_luminance(plan: &Plan) -> f64 {
 /// Luminance along each line of sight at time `t`, cd/m^2.
 fn lit_luminances(plan: &Plan, t: f64) -> Vec<f64> {
     let scene = plan.scene();
-    let lights: Vec<Light> = scene.lights.iter().map(|light: &LightParameters| light.at(t)).collect();
+    let lights: Vec<Light> = scene.tables.lights(t).collect();
     let camera = scene.camera.at(t, plan.size());
-    let ground = scene.ground.as_ref().filter(|_| !scene.has_plate());
-    let sky = scene.sky.as_ref().map_or([0.0; 3], |sky| sky.at(t).horizontal_illuminance());
+    let ground = scene.tables.level_ground(t).filter(|_| !scene.has_plate());
+    let sky = scene.tables.sky(t).map_or([0.0; 3], |stated| stated.sky.horizontal_illuminance());
     let has_air = scene.instances.iter().any(|instance| instance.enabled);
     let along = |index: usize| {
         let [column, row] = [index % COLUMNS, index / COLUMNS].map(|step| step as f64 + 0.5);
         let pixel = DVec2::new(column / COLUMNS as f64 * camera.size[0], row / ROWS as f64 * camera.size[1]);
         let Some(line) = camera.direction(pixel).and_then(DVec3::try_normalize) else { return 0.0 };
-        let hit = ground.and_then(|ground| Some((ground, ground_distance(ground, camera.position, line)?)));
+        let hit = ground.and_then(|ground| Some((ground, ground_distance(&ground, camera.position, line)?)));
         let end = hit.map_or(f64::INFINITY, |(_, distance)| distance);
         let on_ground = hit.map_or(0.0, |(ground, distance)| {
             let arriving =
                 f64::from(luminance(sky)) + illuminance(&lights, camera.position + line * distance, Some(DVec3::Y));
-            arriving * ground.reflectance(t) / std::f64::consts::PI
+            arriving * ground.reflectance / std::f64::consts::PI
         });
         let distances = AIR_DISTANCES.iter().filter(|distance| has_air && **distance < end);
         let in_air = distances.map(|distance| illuminance(&lights, camera.position + line * *distance, None));
@@ -126,7 +126,7 @@ fn lit_luminances(plan: &Plan, t: f64) -> Vec<f64> {
 }
 
 /// Distance along a line of sight at which it meets the ground, m.
-fn ground_distance(ground: &GroundParameters, eye: DVec3, line: DVec3) -> Option<f64> {
+fn ground_distance(ground: &LevelGround, eye: DVec3, line: DVec3) -> Option<f64> {
     let distance = (eye.y - ground.height) / -line.y;
     (line.y < 0.0 && (0.0..MAX_GROUND_DISTANCE).contains(&distance)).then_some(distance)
 }

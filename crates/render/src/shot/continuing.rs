@@ -51,7 +51,7 @@ impl Shot {
         self.runs = compiled.enabled().iter().zip(kept).map(kept_or_restored).collect();
         let has_stepped = self.runs.iter().any(|run| run.steps_taken > 0);
         self.has_earlier_state = has_stepped && (self.has_earlier_state || !is_same_scene);
-        let height = |plan: &Plan| plan.scene.ground.as_ref().map(|ground| ground.height);
+        let height = |plan: &Plan| plan.scene.tables.level_ground(0.0).map(|ground| ground.height);
         if self.context.plan.scene.plate != plan.scene.plate || height(&self.context.plan) != height(&plan) {
             self.plates = PlateCache::default();
         }

@@ -3,10 +3,10 @@
 mod continuing;
 mod data;
 mod reflection;
-mod snapshot;
+pub mod snapshot;
 pub(crate) mod stepping;
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use bansho_base::{
     frame::{Channel, Frame, FrameHeader, PhenomenonMetadata},
@@ -20,7 +20,7 @@ use bansho_base::{
     phenomenon::{
         Prepared, SnapshotError,
         strip::{Shutter, View},
-        surroundings::{Publication, Surroundings},
+        surroundings::{Occluder, Publication, Surroundings, lights_of_parts},
     },
     world::wind::{Wind, WindChangeError},
 };
@@ -40,6 +40,7 @@ use crate::{
     },
     context::ShotContext,
     display::{DisplayFrame, DisplayOptions},
+    exposure_parts::{self, ExposurePart},
     plan::Plan,
 };
 
@@ -131,10 +132,11 @@ impl Shot {
         Ok(t - self.time)
     }
 
-    /// Whether a simulation has been stepped beyond the state from which a frame at time `t` (s) is drawn.
+    /// Whether a simulation has been stepped beyond a state from which a frame at time `t` (s) is drawn.
     pub fn is_past(&self, t: f64) -> bool {
         let shutter = self.context.plan.shutter_at(t);
-        self.runs.iter().any(|run| run.steps_taken > run.steps_until(shutter))
+        let lacks_states = |run: &ActiveRun| run.as_stepped().is_some_and(|run| !run.keeps_states_for(shutter));
+        self.runs.iter().any(|run| run.steps_taken > run.steps_until(shutter) || lacks_states(run))
     }
 
     /// Number of steps that simulations have to take until the first frame can be drawn.
@@ -322,7 +324,9 @@ impl Shot {
         let surroundings = self.surroundings(view, publications, reflection.as_ref());
         let all: Vec<usize> = (0..self.runs.len()).collect();
         let runs: Vec<&ActiveRun> = self.runs.iter().collect();
-        let PreparedSlices { slices, prepared } = self.prepare(&all, view, &surroundings, false, observer)?;
+        let parts = self.exposure_parts(&all, view, &surroundings, publications);
+        let inputs = PreparationInputs { view, surroundings: &surroundings, parts: &parts, is_mirrored: false };
+        let PreparedSlices { slices, prepared } = self.prepare(&all, inputs, observer)?;
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
@@ -378,25 +382,81 @@ impl Shot {
     fn prepare<'a>(
         &'a self,
         which: &[usize],
-        view: &'a View,
-        surroundings: &'a [Surroundings<'a>],
-        is_mirrored: bool,
+        inputs: PreparationInputs<'a>,
         observer: &dyn Observer,
     ) -> Result<PreparedSlices<'a>, RenderError> {
-        let each = || which.par_iter().map(|&index| (&self.runs[index], &surroundings[index]));
+        let PreparationInputs { view, surroundings, parts, is_mirrored } = inputs;
+        let each = || which.par_iter().map(|&index| (&self.runs[index], &surroundings[index], &parts[index]));
         let intervals: Vec<_> = each()
-            .map(|(run, surroundings)| {
+            .map(|(run, surroundings, parts)| {
                 let _part = begin_preparation(run, is_mirrored, observer);
-                run.run.depth_intervals(view, surroundings)
+                match parts.as_slice() {
+                    [] => run.run.depth_intervals(view, surroundings),
+                    parts => exposure_parts::depth_intervals(&*run.run, parts),
+                }
             })
             .collect();
         let prepared = each()
-            .map(|(run, surroundings)| {
+            .map(|(run, surroundings, parts)| {
                 let _part = begin_preparation(run, is_mirrored, observer);
-                run.run.prepare(view, surroundings, observer)
+                match parts.as_slice() {
+                    [] => run.run.prepare(view, surroundings, observer),
+                    parts => exposure_parts::prepare(&*run.run, run.built.phenomenon.info().aovs, parts, observer),
+                }
             })
             .collect::<Result<_, _>>()?;
-        Ok(PreparedSlices { slices: slices::cut(&intervals), prepared })
+        let names = self.table_names(which);
+        Ok(PreparedSlices { slices: slices::cut(&intervals, &names), prepared })
+    }
+
+    /// The names of those phenomena that have a table of their own; `None` for the tables that phenomena share.
+    fn table_names(&self, which: &[usize]) -> Vec<Option<&str>> {
+        let tables: HashSet<&str> =
+            self.context.compiled.scene().instances.iter().map(|instance| instance.name.as_str()).collect();
+        let names = which.iter().map(|&index| self.runs[index].info().name);
+        names.map(|name| tables.contains(name).then_some(name)).collect()
+    }
+
+    /// The parts of the exposure in which each phenomenon is prepared, empty for those that are prepared as a whole and those not in `which`.
+    fn exposure_parts<'a>(
+        &'a self,
+        which: &[usize],
+        view: &View,
+        surroundings: &[Surroundings<'a>],
+        publications: &[Publication],
+    ) -> Vec<Vec<ExposurePart<'a>>> {
+        let mut parts: Vec<Vec<ExposurePart>> = (0..self.runs.len()).map(|_| Vec::new()).collect();
+        for &index in which {
+            let surroundings = &surroundings[index];
+            let of_part = |part: &View| {
+                let mut surroundings = surroundings.clone();
+                surroundings.others.shadow_casters = self.shadow_casters(index, part.shutter, publications);
+                if !surroundings.light_parts.is_empty() {
+                    let fraction = (part.shutter.middle() - view.shutter.open) / view.shutter.duration();
+                    surroundings.others.lights = surroundings.lights_at(fraction).to_vec();
+                    surroundings.light_parts = Vec::new();
+                }
+                surroundings
+            };
+            parts[index] = exposure_parts::exposure_parts(&*self.runs[index].run, view, surroundings, of_part);
+        }
+        parts
+    }
+
+    /// The shadow casters around phenomenon `index` during `part` of the exposure.
+    fn shadow_casters(&self, index: usize, part: Shutter, publications: &[Publication]) -> Vec<Occluder> {
+        let mut casters = Vec::new();
+        for (other, publication) in publications.iter().enumerate() {
+            let run = &self.runs[other];
+            match publication.shadow_casters.as_slice() {
+                [] => {}
+                _ if other == index => {}
+                // The state of a simulation is that of the whole exposure.
+                shown if run.stepping.is_some() => casters.extend_from_slice(shown),
+                _ => casters.extend(run.run.publish(part).shadow_casters),
+            }
+        }
+        casters
     }
 
     /// The surroundings of each phenomenon.
@@ -406,9 +466,58 @@ impl Shot {
         publications: &[Publication],
         mirror: Option<&'a Mirror>,
     ) -> Vec<Surroundings<'a>> {
-        let of_phenomenon = |index| stepping::surroundings(&self.context, publications, index, view.shutter, mirror);
+        let parts = self.light_parts(view.shutter, publications);
+        let is_still = parts.is_empty() || view.path_cameras().is_still();
+        let of_phenomenon = |index| {
+            let mut surroundings = stepping::surroundings(&self.context, publications, index, view.shutter, mirror);
+            let lights = |(part, publications): &(Shutter, Vec<Publication>)| {
+                stepping::lights(&self.context, publications, index, *part)
+            };
+            surroundings.light_parts = parts.iter().map(lights).collect();
+            if !parts.is_empty() && is_still {
+                surroundings.others.lights = lights_of_parts(&surroundings.light_parts);
+            }
+            surroundings
+        };
         (0..self.runs.len()).map(of_phenomenon).collect()
     }
+
+    /// What phenomena publish in each of the equal parts of an exposure in which lights hardly move; none if they stand still.
+    fn light_parts(&self, shutter: Shutter, publications: &[Publication]) -> Vec<(Shutter, Vec<Publication>)> {
+        /// Most lights in the surroundings of all phenomena in all parts, for the memory that they take.
+        const MAX_LIGHTS: usize = 1 << 20;
+        let scene = stepping::scene_publication(&self.context, shutter);
+        let all = || publications.iter().chain([&scene]);
+        let mut count = all().map(|publication| publication.light_parts).max().unwrap_or(1);
+        let lights = all().map(|publication| publication.lights.len()).sum::<usize>();
+        while count > 1 && count * lights * self.runs.len() > MAX_LIGHTS {
+            count /= 2;
+        }
+        if count <= 1 {
+            return Vec::new();
+        }
+        let during = |part: Shutter| {
+            let publish = |(run, whole): (&ActiveRun, &Publication)| {
+                // The state of a simulation is that of the whole exposure.
+                let moves = whole.light_parts > 1 && run.stepping.is_none();
+                if moves { run.run.publish(part) } else { whole.clone() }
+            };
+            (part, self.runs.iter().zip(publications).map(publish).collect())
+        };
+        (0..count).map(|index| during(shutter.part(index, count))).collect()
+    }
+}
+
+/// What phenomena are prepared from.
+#[derive(Clone, Copy)]
+struct PreparationInputs<'a> {
+    view: &'a View,
+    /// Those of each phenomenon.
+    surroundings: &'a [Surroundings<'a>],
+    /// The parts of the exposure in which each phenomenon is prepared.
+    parts: &'a [Vec<ExposurePart<'a>>],
+    /// Whether it is the reflection in a mirror.
+    is_mirrored: bool,
 }
 
 /// Begins the preparation of a phenomenon, for the picture or for its reflection.

@@ -10,7 +10,7 @@ use bansho_base::{
     },
 };
 
-use super::{PreparedSlices, RenderError, Shot};
+use super::{PreparationInputs, PreparedSlices, RenderError, Shot};
 use crate::{
     compiled::ActiveRun,
     composite::{
@@ -68,7 +68,7 @@ impl Shot {
         let view = view.with_window(window);
         let mut image = self.mirrored_phenomena(&view, mirror.index, mirrored, publications, observer)?;
         // An invisible sky lights the ground, but is not reflected in still water.
-        let is_visible = self.context.plan.scene.sky.as_ref().is_none_or(|sky| sky.visible);
+        let is_visible = self.context.plan.scene.tables.sky(view.shutter.middle()).is_none_or(|sky| sky.is_visible);
         let part = StagePart { stage: Stage::Draw, phenomenon: None, is_mirrored: true };
         let _part = PartGuard::begin(observer, part);
         if is_visible && mirrored.color.is_some() {
@@ -90,7 +90,9 @@ impl Shot {
         let surroundings = self.surroundings(view, publications, None);
         let others: Vec<usize> = (0..self.runs.len()).filter(|&index| index != mirror).collect();
         let runs: Vec<&ActiveRun> = others.iter().map(|&index| &self.runs[index]).collect();
-        let PreparedSlices { slices, prepared } = self.prepare(&others, view, &surroundings, true, observer)?;
+        let parts = self.exposure_parts(&others, view, &surroundings, publications);
+        let inputs = PreparationInputs { view, surroundings: &surroundings, parts: &parts, is_mirrored: true };
+        let PreparedSlices { slices, prepared } = self.prepare(&others, inputs, observer)?;
         let composition = Composition {
             outputs: Outputs::RADIANCE,
             is_mirrored: true,

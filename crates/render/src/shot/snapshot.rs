@@ -28,19 +28,31 @@ pub(crate) fn write(compiled: &CompiledScene, runs: &[ActiveRun]) -> Vec<u8> {
     bytes
 }
 
+/// Checks that `bytes` are a whole snapshot, of whatever scene.
+///
+/// # Errors
+/// They are damaged, or of another version.
+pub fn check(bytes: &[u8]) -> Result<(), SnapshotError> {
+    contents(bytes).map(drop)
+}
+
+/// What stands between the version and the checksum of a whole snapshot.
+fn contents(bytes: &[u8]) -> Result<&[u8], SnapshotError> {
+    let damaged = SnapshotError::Damaged;
+    let split = bytes.len().checked_sub(CHECKSUM_BYTES).map(|at| bytes.split_at(at));
+    let (contents, checksum) = split.ok_or(damaged)?;
+    let mut rest = contents.strip_prefix(MAGIC).ok_or(damaged)?;
+    let found = u32::from_le_bytes(take(&mut rest).ok_or(damaged)?);
+    if found != VERSION {
+        return Err(SnapshotError::Version { found, known: VERSION });
+    }
+    if blake3::hash(contents).as_bytes() != checksum { Err(damaged) } else { Ok(rest) }
+}
+
 /// Restores `runs`, which must be in their initial states.
 pub(crate) fn read(compiled: &CompiledScene, bytes: &[u8], runs: &mut [ActiveRun]) -> Result<(), RenderError> {
     let damaged = || RenderError::from(SnapshotError::Damaged);
-    let (contents, checksum) =
-        bytes.len().checked_sub(CHECKSUM_BYTES).map(|at| bytes.split_at(at)).ok_or_else(damaged)?;
-    let mut rest = contents.strip_prefix(MAGIC).ok_or_else(damaged)?;
-    let found = u32::from_le_bytes(take(&mut rest).ok_or_else(damaged)?);
-    if found != VERSION {
-        return Err(SnapshotError::Version { found, known: VERSION }.into());
-    }
-    if blake3::hash(contents).as_bytes() != checksum {
-        return Err(damaged());
-    }
+    let mut rest = contents(bytes)?;
     let fingerprint: [u8; 32] = take(&mut rest).ok_or_else(damaged)?;
     if fingerprint != compiled.state_fingerprint() {
         return Err(RenderError::ForeignSnapshot);

@@ -4,7 +4,7 @@ use bansho_base::{
     host::observer::{self, Cancelled, Observer, PartGuard, Stage, StagePart},
     phenomenon::{
         strip::Shutter,
-        surroundings::{Publication, Surroundings},
+        surroundings::{Light, Publication, Surroundings},
     },
 };
 
@@ -25,10 +25,23 @@ pub(crate) fn surroundings<'a>(
         reflection: mirror.and_then(|mirror| mirror.picture.as_ref()),
         backdrop: mirror.and_then(|mirror| mirror.backdrop.as_ref()),
         others: others(context, publications, index, shutter),
+        light_parts: Vec::new(),
     }
 }
 
-/// What all phenomena but `index` publish during `shutter`, and the scene's own lights and obstacles.
+/// The lights of all phenomena but `index`, and the scene's own, in the middle of `shutter`.
+pub(crate) fn lights(
+    context: &ShotContext,
+    publications: &[Publication],
+    index: usize,
+    shutter: Shutter,
+) -> Vec<Light> {
+    let scene = context.plan.scene.tables.lights(shutter.middle());
+    let others = publications.iter().enumerate().filter(|(other, _)| *other != index);
+    scene.chain(others.flat_map(|(_, publication)| publication.lights.iter().copied())).collect()
+}
+
+/// What all phenomena but `index` publish during `shutter`, and the scene's own lights and solids.
 fn others(context: &ShotContext, publications: &[Publication], index: usize, shutter: Shutter) -> Publication {
     let mut others = scene_publication(context, shutter);
     for (other, publication) in publications.iter().enumerate() {
@@ -39,10 +52,16 @@ fn others(context: &ShotContext, publications: &[Publication], index: usize, shu
     others
 }
 
-/// The scene's own lights and obstacles during `shutter`.
+/// The scene's own lights, solids and media during `shutter`.
 pub(crate) fn scene_publication(context: &ShotContext, shutter: Shutter) -> Publication {
-    let lights = context.plan.scene.lights.iter().map(|light| light.at(shutter.middle())).collect();
-    Publication { lights, occluders: context.compiled.obstacles(shutter.middle()).collect(), ..Publication::default() }
+    let tables = &context.plan.scene.tables;
+    Publication {
+        lights: tables.lights(shutter.middle()).collect(),
+        light_parts: tables.light_parts(shutter),
+        extinction: tables.extinction(shutter.middle()),
+        occluders: context.compiled.solids(shutter.middle()).collect(),
+        ..Publication::default()
+    }
 }
 
 /// Steps all phenomena to the states from which the exposure `shutter` is drawn. The one whose time is earliest steps next, so that the order
@@ -54,6 +73,9 @@ pub(crate) fn advance(
     max_steps: u64,
     observer: &dyn Observer,
 ) -> Result<u64, Cancelled> {
+    for stepped in runs.iter_mut().filter_map(|run| run.run.as_stepped_mut()) {
+        stepped.begin_exposure(shutter);
+    }
     for taken in 0..max_steps {
         let earliest = (0..runs.len())
             .filter(|&index| runs[index].steps_taken < runs[index].steps_until(shutter))

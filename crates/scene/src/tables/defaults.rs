@@ -1,82 +1,63 @@
 //! Defaults that depend on the other values of a scene: the camera, backdrop and exposure of its phenomena.
 //!
-//! [`PhenomenonKind::setting`] describes a scene that shows a phenomenon of a kind well. If all phenomena of a scene are of one kind, its
-//! values are the defaults for:
+//! [`TableKind::scene_defaults`] describes a scene that shows a phenomenon of a kind well. If all phenomena of a scene are of one
+//! kind, its values are the defaults for:
 //!
 //! - the camera, if the text states neither `camera.position` nor `camera.target`, nor the positions or sizes of the phenomena;
-//! - the sky, if the text states neither a sky nor a light;
-//! - the ground and the lights, if the text states neither sky, ground nor light;
-//! - the exposure, if sky, ground and lights all have these defaults, and the text does not state the positions or sizes of the phenomena:
-//!   elsewhere, they may be darker or brighter than in the setting.
+//! - shared tables that can be implied, if the text states neither that table nor one that prevents it ([`SharedRole::implied_unless`]): the sky, if it states
+//!   neither a sky nor a light; the ground and the lights, if it states neither sky, ground nor light;
+//! - the exposure, if all these tables are implied, and the text does not state the positions or sizes of the phenomena: elsewhere, they may be darker or
+//!   brighter than in the scene that the kind describes.
 //!
-//! A scene with a plate or an obstacle has none of these defaults, since those determine camera and background. With any phenomena, the
-//! default white balance of a night sky is that of a camera at night.
+//! A scene with a plate or an obstacle has none of these defaults, since those determine camera and background ([`SharedRole::determines_view`]).
+//!
+//! [`SharedRole::implied_unless`]: bansho_base::tables::SharedRole::implied_unless
+//! [`SharedRole::determines_view`]: bansho_base::tables::SharedRole::determines_view
 
-use bansho_base::parameters::{Node, Table, Value};
+use bansho_base::{
+    parameters::{Node, Table, Value},
+    tables::{self, TableKind},
+};
 
-use crate::{PhenomenonKind, text::toml};
-
-/// White balance of a camera at night, K.
-const NIGHT_WHITE_K: f64 = 4000.0;
-
-/// Which shared tables the text of a scene omits and its phenomena imply. They always light the scene; they are visible if
-/// [`SceneOptions::implied_backdrop`](crate::SceneOptions::implied_backdrop) is set.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ImpliedBackdrop {
-    /// `[sky]`
-    pub sky: bool,
-    /// `[ground]`
-    pub ground: bool,
-    /// `[[light]]`
-    pub lights: bool,
-}
-
-impl ImpliedBackdrop {
-    /// Whether anything is implied.
-    pub fn is_any(self) -> bool {
-        self.sky || self.ground || self.lights
-    }
-}
+use crate::text::toml;
 
 /// `root` with the defaults for the values that its text omits, and which of its tables are implied.
-pub(crate) fn with_defaults(root: &Table, kinds: &[PhenomenonKind]) -> (Table, ImpliedBackdrop) {
+pub(crate) fn with_defaults(root: &Table, kinds: &[TableKind]) -> (Table, Vec<&'static str>) {
     let mut completed = root.clone();
+    let states_view = kinds
+        .iter()
+        .any(|kind| kind.shared_role().is_some_and(|role| role.determines_view) && root.get(kind.key).is_some());
     let implied = match only_kind(root, kinds) {
-        Some(kind) if !has_plate(root) && root.get("obstacle").is_none() => imply_setting(&mut completed, root, kind),
-        _ => ImpliedBackdrop::default(),
+        Some(kind) if !has_plate(root) && !states_view => imply_setting(&mut completed, root, kind, kinds),
+        _ => Vec::new(),
     };
-    if is_night(&completed) {
-        imply(&mut completed, "picture", "white_balance_k", Value::Number(NIGHT_WHITE_K));
-    }
     (completed, implied)
 }
 
 /// The kind of all phenomena, if they have the same.
-fn only_kind<'a>(root: &Table, kinds: &'a [PhenomenonKind]) -> Option<&'a PhenomenonKind> {
-    let mut stated = kinds.iter().filter(|kind| root.get(kind.key).is_some());
+fn only_kind<'a>(root: &Table, kinds: &'a [TableKind]) -> Option<&'a TableKind> {
+    let mut stated = tables::phenomena(kinds).filter(|kind| root.get(kind.key).is_some());
     stated.next().filter(|_| stated.next().is_none())
 }
 
-/// Adds the backdrop, the exposure and the camera of the setting where the text states nothing that contradicts them.
-fn imply_setting(completed: &mut Table, root: &Table, kind: &PhenomenonKind) -> ImpliedBackdrop {
+/// Adds the shared tables, the exposure and the camera of the scene defaults where the text states nothing that contradicts them. Returns the keys of the
+/// shared tables.
+fn imply_setting(completed: &mut Table, root: &Table, kind: &TableKind, kinds: &[TableKind]) -> Vec<&'static str> {
     // A test checks that all settings can be parsed.
     let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
     let states = |key: &str| root.get(key).is_some();
-    let no_light = !states("sky") && !states("light");
-    let has = |key: &str| setting.get(key).is_some();
-    let setting_backdrop = ImpliedBackdrop { sky: has("sky"), ground: has("ground"), lights: has("light") };
-    let implied = ImpliedBackdrop {
-        sky: no_light && setting_backdrop.sky,
-        ground: no_light && !states("ground") && setting_backdrop.ground,
-        lights: no_light && !states("ground") && setting_backdrop.lights,
-    };
-    for (key, is_implied) in [("sky", implied.sky), ("ground", implied.ground), ("light", implied.lights)] {
-        if let Some(Node { value, .. }) = setting.get(key).filter(|_| is_implied) {
-            completed.push(key, value.clone());
+    let (mut implied, mut in_setting) = (Vec::new(), 0);
+    for shared in kinds {
+        let Some(unless) = shared.shared_role().and_then(|role| role.implied_unless) else { continue };
+        let Some(Node { value, .. }) = setting.get(shared.key) else { continue };
+        in_setting += 1;
+        if !states(shared.key) && !unless.iter().any(|key| states(key)) {
+            completed.push(shared.key, value.clone());
+            implied.push(shared.key);
         }
     }
     if !states_placement(root, kind) {
-        if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied == setting_backdrop)
+        if let Some(exposure) = value_in(&setting, "picture", "exposure_ev100").filter(|_| implied.len() == in_setting)
         {
             imply(completed, "picture", "exposure_ev100", exposure.clone());
         }
@@ -86,7 +67,7 @@ fn imply_setting(completed: &mut Table, root: &Table, kind: &PhenomenonKind) -> 
 }
 
 /// Whether the text states the position or the size of a phenomenon.
-fn states_placement(root: &Table, kind: &PhenomenonKind) -> bool {
+fn states_placement(root: &Table, kind: &TableKind) -> bool {
     let Some(Value::List(items)) = root.get(kind.key).map(|node| &node.value) else { return false };
     let states = |item: &Node| match &item.value {
         Value::Table(table) => kind.placement_keys.iter().any(|key| table.get(key).is_some()),
@@ -95,7 +76,7 @@ fn states_placement(root: &Table, kind: &PhenomenonKind) -> bool {
     items.iter().any(states)
 }
 
-/// Completes a perspective camera without position and target by those of the setting.
+/// Completes a perspective camera without position and target by those of the scene defaults.
 fn imply_camera(completed: &mut Table, root: &Table, setting: &Table) {
     let states = |key: &str| value_in(root, "camera", key).is_some();
     let is_perspective = value_in(root, "camera", "lens").is_none_or(|lens| *lens == Value::Text("perspective".into()));
@@ -134,8 +115,4 @@ fn value_in<'a>(root: &'a Table, table: &str, key: &str) -> Option<&'a Value> {
 
 fn has_plate(root: &Table) -> bool {
     value_in(root, "plate", "image").is_some()
-}
-
-fn is_night(root: &Table) -> bool {
-    value_in(root, "sky", "kind").is_some_and(|kind| *kind == Value::Text("night".into()))
 }

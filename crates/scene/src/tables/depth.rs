@@ -9,14 +9,14 @@ use super::picture::DepthKind;
 pub struct DepthScale {
     /// What the values measure.
     pub kind: DepthKind,
-    /// Meters of a unit. The inverse depth is `shift + value / meters`.
+    /// Meters of a unit; negative where the values are, as z of a camera that looks toward -z. The inverse depth is `shift + value / meters`.
     pub meters: f64,
     /// Inverse distance at an inverse depth of 0, 1/m.
     pub shift: f64,
 }
 
 impl DepthScale {
-    /// Distance of `value`, m; infinite where it is 0, negative, infinite or NaN.
+    /// Distance of `value`, m; infinite where it is 0, infinite, NaN or on the other side of the camera.
     pub fn meters_of(&self, value: f32) -> f64 {
         if !value.is_finite() || value == 0.0 {
             return f64::INFINITY;
@@ -26,6 +26,122 @@ impl DepthScale {
             DepthKind::Axis | DepthKind::Distance => self.meters * f64::from(value),
         };
         if meters > 0.0 { meters } else { f64::INFINITY }
+    }
+}
+
+/// What the values of a depth are.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DepthValues {
+    /// Finite and above 0.
+    pub positive: usize,
+    /// Finite and below 0.
+    pub negative: usize,
+    /// 0, which means no value.
+    pub zero: usize,
+    /// Infinite: the sky.
+    pub infinite: usize,
+    /// Not a number.
+    pub not_a_number: usize,
+    /// Smallest and largest of those that are finite and not 0; both 0 without any.
+    pub(super) range: [f32; 2],
+}
+
+impl DepthValues {
+    pub(super) fn of(values: &[f32]) -> Self {
+        let (mut counts, mut range) = (Self::default(), [f32::INFINITY, f32::NEG_INFINITY]);
+        for &value in values {
+            if value.is_nan() {
+                counts.not_a_number += 1;
+            } else if value.is_infinite() {
+                counts.infinite += 1;
+            } else if value == 0.0 {
+                counts.zero += 1;
+            } else {
+                counts.positive += usize::from(value > 0.0);
+                counts.negative += usize::from(value < 0.0);
+                range = [range[0].min(value), range[1].max(value)];
+            }
+        }
+        if counts.positive + counts.negative > 0 { Self { range, ..counts } } else { counts }
+    }
+
+    /// Whether they are z in the space of a camera that looks toward -z: all that are finite are negative.
+    pub(super) fn are_negative(&self) -> bool {
+        self.negative > 0 && self.positive == 0
+    }
+
+    fn total(&self) -> usize {
+        self.positive + self.negative + self.zero + self.infinite + self.not_a_number
+    }
+
+    /// What a depth of these values cannot be meant to do, at a camera that draws nothing nearer than `near`.
+    pub(super) fn doubt(&self, scale: &DepthScale, near: f64) -> Option<DepthDoubt> {
+        let ends = self.range.map(|value| scale.meters_of(value));
+        let [nearest, farthest] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        match nearest {
+            f64::INFINITY => Some(DepthDoubt::HidesNothing(*self)),
+            _ if farthest < near => Some(DepthDoubt::TooNear { farthest, near }),
+            _ if nearest > FARTHEST => Some(DepthDoubt::TooFar { nearest }),
+            _ if scale.kind != DepthKind::Inverse && self.positive > 0 && self.negative > 0 => {
+                Some(DepthDoubt::SomeNegative { negative: self.negative, total: self.total() })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Distance beyond which nothing on the Earth is seen, m.
+const FARTHEST: f64 = 1e7;
+
+/// Why a depth probably is not what was meant.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum DepthDoubt {
+    /// No value is a depth.
+    #[error("it hides nothing, since none of its {} values is a depth: {}", .0.total(), listed(.0))]
+    HidesNothing(DepthValues),
+    /// All of it is nearer than the camera draws.
+    #[error(
+        "it hides everything, since all of it is nearer than {farthest:.2e} m, and nothing is drawn nearer than {near} m; `depth_scale` states the meters of its \
+         unit"
+    )]
+    TooNear {
+        /// Its largest distance, m.
+        farthest: f64,
+        /// The near distance of the camera, m.
+        near: f64,
+    },
+    /// All of it is farther than anything.
+    #[error(
+        "it hides nothing, since all of it is farther than {nearest:.2e} m; `depth_scale` states the meters of its unit"
+    )]
+    TooFar {
+        /// Its smallest distance, m.
+        nearest: f64,
+    },
+    /// Some values are negative among positive ones.
+    #[error("{negative} of its {total} values are negative, and hide nothing there")]
+    SomeNegative {
+        /// Number of negative values.
+        negative: usize,
+        /// Number of all values.
+        total: usize,
+    },
+}
+
+/// What values are that are no depth.
+fn listed(values: &DepthValues) -> String {
+    let kinds = [
+        (values.zero, "0"),
+        (values.not_a_number, "not a number"),
+        (values.infinite, "infinite or not a number"),
+        (values.negative, "negative"),
+        (values.positive, "beyond infinity by `depth_shift`"),
+    ];
+    let named: Vec<String> =
+        kinds.iter().filter(|(count, _)| *count > 0).map(|(count, kind)| format!("{count} {kind}")).collect();
+    match &named[..] {
+        [only] => format!("all are {}", only.split_once(' ').map_or("", |(_, kind)| kind)),
+        _ => named.join(", "),
     }
 }
 
@@ -102,10 +218,10 @@ pub struct DepthFit {
     pub misfits: Vec<(usize, f64, f64)>,
 }
 
-/// Relative deviation beyond which a point is told.
+/// Relative deviation beyond which a point is a misfit.
 const MISFIT: f64 = 0.1;
-/// Most points that are told.
-const TOLD_POINTS: usize = 6;
+/// Largest number of misfits that a message lists.
+const MAX_LISTED_MISFITS: usize = 6;
 
 impl DepthFit {
     /// The scale that was found.
@@ -124,10 +240,10 @@ impl fmt::Display for DepthFit {
             scale.shift,
             100.0 * self.residual
         )?;
-        for (point, known, found) in self.misfits.iter().take(TOLD_POINTS) {
+        for (point, known, found) in self.misfits.iter().take(MAX_LISTED_MISFITS) {
             write!(f, "; point {point} is {known} m away, and would be {found:.2} m")?;
         }
-        match self.misfits.len().saturating_sub(TOLD_POINTS) {
+        match self.misfits.len().saturating_sub(MAX_LISTED_MISFITS) {
             0 => Ok(()),
             more => write!(f, "; {more} more points do not fit"),
         }
@@ -248,6 +364,38 @@ mod tests {
         let outside = Outside { point: 2, x: 100.0, y: 0.0, width: 100, height: 50 };
         assert_eq!(fitted(&[near, [100.0, 0.0, 1.0]]), Err(outside));
         assert_eq!(fit(&[near, near], DepthKind::Axis, [100, 50], column), Err(NotInverse));
+    }
+
+    #[test]
+    fn a_depth_without_a_usable_value_is_told_by_what_it_is() {
+        let axis = DepthScale { kind: DepthKind::Axis, meters: 1.0, shift: 0.0 };
+        let told = |values: &[f32], scale: &DepthScale| {
+            DepthValues::of(values).doubt(scale, 0.05).map(|doubt| doubt.to_string())
+        };
+        for (values, words) in [
+            ([0.0, 0.0, 0.0], "none of its 3 values is a depth: all are 0"),
+            ([f32::NAN; 3], "all are not a number"),
+            ([f32::INFINITY; 3], "all are infinite"),
+            ([0.0, f32::NAN, 0.0], "2 0, 1 not a number"),
+            ([-1.0, -2.0, -3.0], "all are negative"),
+            ([1e-30, 1e-3, 0.0], "hides everything"),
+            ([1e30, 1e9, 0.0], "hides nothing, since all of it is farther"),
+            ([4.0, -1.0, 2.0], "1 of its 3 values are negative"),
+        ] {
+            let found = told(&values, &axis).unwrap_or_default();
+            assert!(found.contains(words), "{values:?}: {found}");
+        }
+        for usable in [[0.0, 2.0, f32::NAN], [1.0, 1.0, 1.0], [100.0, f32::INFINITY, 0.01]] {
+            assert_eq!(told(&usable, &axis), None, "{usable:?}");
+        }
+        let turned = DepthScale { meters: -1.0, ..axis };
+        assert!(DepthValues::of(&[-2.0, -100.0, 0.0]).are_negative() && told(&[-2.0, -100.0, 0.0], &turned).is_none());
+        assert_eq!([-2.0, 2.0, 0.0].map(|value| turned.meters_of(value)), [2.0, f64::INFINITY, f64::INFINITY]);
+        assert!(!DepthValues::of(&[-2.0, 1.0]).are_negative() && !DepthValues::of(&[0.0, f32::NAN]).are_negative());
+        // An inverse depth may be negative where its shift is positive.
+        let inverse = DepthScale { kind: DepthKind::Inverse, meters: 1.0, shift: 3.0 };
+        assert_eq!(told(&[-2.0, 1.0, 0.5], &inverse), None);
+        assert!(told(&[-4.0, -5.0, -3.0], &inverse).is_some_and(|told| told.contains("all are negative")));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use bansho_base::{camera::Camera, math::DVec2};
 
 use super::{depth::DepthScale, picture::DepthKind};
 
-/// Whence a plate was taken, as the scene says.
+/// The view from which a plate was taken, as the scene states it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlateView {
     /// The camera, for a picture without overscan.
@@ -40,31 +40,33 @@ impl PlateView {
     }
 }
 
-/// Samples along the longer side of a depth.
+/// Number of samples along the longer side of a depth picture.
 const SAMPLES: usize = 256;
-/// Pairs of samples that are tried.
+/// Number of pairs of samples that are tried.
 const PAIRS: usize = 1000;
-/// Samples that judge a pair.
-const JUDGES: usize = 2000;
-/// Largest deviation of a pixel that agrees with the ground: of its distance, and of the nearest ground's inverse distance, which stands for the noise of estimators.
+/// Number of samples on which a pair is tested.
+const CONSENSUS_SAMPLES: usize = 2000;
+/// Largest deviation of a pixel that agrees with the ground, as a fraction of the ground's inverse distance there.
 const RELATIVE_TOLERANCE: f64 = 0.1;
+/// Added to that, as a fraction of the nearest ground's inverse distance: the noise of depth estimators.
 const NOISE_TOLERANCE: f64 = 0.005;
-/// Smallest difference of two samples that make a pair, of the nearest ground's inverse distance.
-const PAIR_DISTANCE: f64 = 0.05;
-/// Smallest share of pixels below the horizon that must agree with the ground.
-const LEAST_SHARE: f64 = 0.1;
-/// Least number of pixels below the horizon.
-const LEAST_SAMPLES: usize = 16;
-/// Least share of the variance of the inverse distance that the values of agreeing pixels explain.
-const LEAST_EXPLAINED: f64 = 0.9;
-/// Steps of refinement, and where Tukey's weights become 0, standard deviations.
-const REFINEMENTS: usize = 20;
-const TUKEY: f64 = 4.685;
+/// Smallest difference of the inverse distances of two samples that make a pair, as a fraction of the nearest ground's.
+const MIN_PAIR_DIFFERENCE: f64 = 0.05;
+/// Smallest fraction of the pixels below the horizon that must agree with the ground.
+const MIN_AGREEING_FRACTION: f64 = 0.1;
+/// Smallest number of samples below the horizon.
+const MIN_SAMPLES: usize = 16;
+/// Smallest fraction of the variance of the inverse distance that the values of agreeing pixels must explain.
+const MIN_EXPLAINED_VARIANCE: f64 = 0.9;
+/// Number of refinement steps.
+const REFINEMENT_STEPS: usize = 20;
+/// Deviation from which on Tukey's weights are 0, standard deviations.
+const TUKEY_CUTOFF: f64 = 4.685;
 
 /// Why scale and shift cannot be found from the ground.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub(super) enum GroundFitError {
-    /// The camera sees no ground.
+    /// No ground is visible to the camera.
     #[error(
         "scale and shift of the depth are not stated, and the camera sees no ground at {height} m from which they could be found; allowed: `depth_known`, \
          or `depth_scale` and `depth_shift`"
@@ -73,19 +75,19 @@ pub(super) enum GroundFitError {
         /// Height of the ground, m.
         height: f64,
     },
-    /// Too few pixels are ground.
+    /// Too few pixels agree with the ground.
     #[error(
         "scale and shift of the depth are not stated, and {:.1} % of the pixels below the horizon agree with the ground at {height} m, from which they would be \
          found; allowed: at least {:.0} %, with the camera of the photograph; or `depth_known`, or `depth_scale` and `depth_shift`",
-        100.0 * .share, 100.0 * LEAST_SHARE
+        100.0 * .share, 100.0 * MIN_AGREEING_FRACTION
     )]
     TooFew {
-        /// Share of the pixels below the horizon that agree.
+        /// Fraction of the pixels below the horizon that agree.
         share: f64,
         /// Height of the ground, m.
         height: f64,
     },
-    /// The pixels that agree do so by their number alone.
+    /// The values of the pixels that agree do not follow the distance of the ground.
     #[error(
         "scale and shift of the depth are not stated, and its values do not follow the distance of the ground at {height} m, from which they would be found; \
          allowed: `depth_known`, or `depth_scale` and `depth_shift`"
@@ -103,7 +105,7 @@ pub struct GroundFit {
     pub shift: f64,
     /// Inverse distance for each unit, 1/m.
     pub slope: f64,
-    /// Share of the pixels below the horizon that agree with the ground.
+    /// Fraction of the pixels below the horizon that agree with the ground.
     pub share: f64,
     /// Root mean square of (found - known) / known of the distances of those pixels.
     pub residual: f64,
@@ -115,7 +117,7 @@ impl GroundFit {
         DepthScale { kind: DepthKind::Inverse, meters: 1.0 / self.slope, shift: self.shift }
     }
 
-    /// The difference of the inverse distance of a sample to the ground's.
+    /// Inverse distance of a sample by this fit, less that of the ground there, 1/m.
     fn deviation(&self, sample: &Sample) -> f64 {
         self.slope.mul_add(sample.value, self.shift) - sample.inverse
     }
@@ -144,18 +146,18 @@ struct Sample {
     inverse: f64,
 }
 
-/// What is known of the ground in a plate.
+/// Samples of a depth picture below the horizon.
 struct GroundSamples {
-    /// Those with a value, from far to near.
+    /// Those that have a depth value, from far to near.
     samples: Vec<Sample>,
-    /// Number of pixels below the horizon, with those that have no value.
+    /// Number of all samples below the horizon, including those without a depth value.
     below_horizon: usize,
-    /// Inverse distance of the nearest ground.
+    /// Inverse distance of the nearest ground, 1/m.
     nearest: f64,
 }
 
 impl GroundSamples {
-    /// Those of a depth with these values, which belongs to an image of `image_size` pixels.
+    /// Samples of a depth picture with these values, which belongs to an image of `image_size` pixels.
     fn new(values: &[f32], [width, height]: [usize; 2], image_size: [usize; 2], view: &PlateView, ground: f64) -> Self {
         let step = width.max(height).div_ceil(SAMPLES);
         let positions = |side: usize| (step.min(side) / 2..side).step_by(step);
@@ -190,19 +192,19 @@ impl GroundSamples {
     /// The line through the pair of samples with which most others agree.
     fn consensus(&self) -> Option<GroundFit> {
         let count = self.samples.len();
-        let judges = || self.samples.iter().step_by(count.div_ceil(JUDGES).max(1));
+        let consensus_samples = || self.samples.iter().step_by(count.div_ceil(CONSENSUS_SAMPLES).max(1));
         let mut best: Option<(usize, GroundFit)> = None;
         for pair in 0..PAIRS {
             // A sequence that fills the plane evenly (Roberts 2018).
             let at = |step: f64| ((step * pair as f64).fract() * count as f64) as usize;
             let [a, b] = [at(0.754_877_666_246_692_7), at(0.569_840_290_998_053_2)].map(|index| self.samples[index]);
             let slope = (a.inverse - b.inverse) / (a.value - b.value);
-            let is_wide = (a.inverse - b.inverse).abs() >= PAIR_DISTANCE * self.nearest;
+            let is_wide = (a.inverse - b.inverse).abs() >= MIN_PAIR_DIFFERENCE * self.nearest;
             if !(is_wide && slope > 0.0 && slope.is_finite()) {
                 continue;
             }
             let fit = GroundFit { slope, shift: a.inverse - slope * a.value, share: 0.0, residual: 0.0 };
-            let agreeing = judges().filter(|sample| self.agrees(&fit, sample)).count();
+            let agreeing = consensus_samples().filter(|sample| self.agrees(&fit, sample)).count();
             if best.is_none_or(|(most, _)| agreeing > most) {
                 best = Some((agreeing, fit));
             }
@@ -218,7 +220,7 @@ impl GroundSamples {
         deviations.sort_by(f64::total_cmp);
         let median = *deviations.get(deviations.len() / 2)?;
         // 1.4826 median: a normal distribution's standard deviation. The floor keeps exact data from dividing by 0.
-        let reach = TUKEY * (1.4826 * median).max(1e-6);
+        let reach = TUKEY_CUTOFF * (1.4826 * median).max(1e-6);
         let weighted: Vec<(f64, Sample)> = self
             .samples
             .iter()
@@ -238,14 +240,15 @@ impl GroundSamples {
         (slope > 0.0 && slope.is_finite()).then_some(GroundFit { slope, shift: inverse - slope * value, ..*fit })
     }
 
-    /// The share of `fit` and its residual; and the share of the variance that it explains.
-    fn judged(&self, fit: &GroundFit) -> (GroundFit, f64) {
+    /// `fit` with its share and residual, and the fraction of the variance that it explains.
+    fn evaluate(&self, fit: &GroundFit) -> (GroundFit, f64) {
         let agreeing: Vec<&Sample> = self.samples.iter().filter(|sample| self.agrees(fit, sample)).collect();
         let count = agreeing.len().max(1) as f64;
         let mean = agreeing.iter().map(|sample| sample.inverse).sum::<f64>() / count;
         let sum = |of: &dyn Fn(&Sample) -> f64| agreeing.iter().map(|sample| of(sample) * of(sample)).sum::<f64>();
         let explained = 1.0 - sum(&|sample| fit.deviation(sample)) / sum(&|sample| sample.inverse - mean);
-        // Of the distance: 1 / found - 1 / known over 1 / known. What the noise moves beyond infinity deviates by its whole distance.
+        // Relative deviation of the distance: (1 / found - 1 / known) / (1 / known). Noise may make the inverse distance found negative;
+        // that counts as a deviation of 100 %.
         let relative = |sample: &Sample| {
             let found = sample.inverse + fit.deviation(sample);
             if found > 0.0 { (sample.inverse / found - 1.0).clamp(-1.0, 1.0) } else { 1.0 }
@@ -266,23 +269,23 @@ pub(super) fn fit(
     height: f64,
 ) -> Result<GroundFit, GroundFitError> {
     let samples = GroundSamples::new(values, size, image_size, view, height);
-    if samples.below_horizon < LEAST_SAMPLES {
+    if samples.below_horizon < MIN_SAMPLES {
         return Err(GroundFitError::NotSeen { height });
     }
     let too_few = |share| GroundFitError::TooFew { share, height };
-    if samples.samples.len() < LEAST_SAMPLES {
+    if samples.samples.len() < MIN_SAMPLES {
         return Err(too_few(0.0));
     }
     let mut found = samples.consensus().ok_or(GroundFitError::Flat { height })?;
-    for _ in 0..REFINEMENTS {
+    for _ in 0..REFINEMENT_STEPS {
         let Some(refined) = samples.refined(&found) else { break };
         found = refined;
     }
-    let (fit, explained) = samples.judged(&found);
-    if fit.share < LEAST_SHARE {
+    let (fit, explained) = samples.evaluate(&found);
+    if fit.share < MIN_AGREEING_FRACTION {
         return Err(too_few(fit.share));
     }
-    if explained < LEAST_EXPLAINED {
+    if explained < MIN_EXPLAINED_VARIANCE {
         return Err(GroundFitError::Flat { height });
     }
     Ok(fit)

@@ -3,5 +3,6 @@
 pub(crate) mod defaults;
 pub(crate) mod depth;
 pub(crate) mod ground_fit;
+pub mod kinds;
 pub mod picture;
 pub(crate) mod plate;

@@ -1,13 +1,11 @@
-//! The tables `[picture]`, `[plate]` and `[[light]]`.
+//! The tables `[picture]` and `[plate]`.
 
 use bansho_base::{
     color::MAX_EV100,
-    math::{self, DVec3},
-    parameters::{
-        AssetPath, Auto, Kind, Length, Node, Parameter, ProblemKind, Range, Reader, Value, animated::Animated,
-    },
-    phenomenon::surroundings::{Emitter, Light},
+    parameters::{AssetPath, Auto, Kind, Length, Node, Parameter, ProblemKind, Range, Reader, Value},
 };
+
+use crate::text::path::ValuePath;
 
 /// Largest side of a picture, pixels.
 pub const LARGEST_SIDE: f64 = 16_384.0;
@@ -33,14 +31,31 @@ fn parse_fraction(text: &str) -> Option<FrameRate> {
     Some(FrameRate { frames: frames.trim().parse().ok()?, seconds: seconds.trim().parse().ok()? })
 }
 
-/// Decimal rates have three decimal places: no rate in use needs more.
+/// Largest difference from n 1000 / 1001 of a decimal that means that rate: 23.98 is as usual as 23.976.
+const NTSC_TOLERANCE: f64 = 0.01;
+
+/// The rate that a decimal means. Those of NTSC, n 1000 / 1001, are written with two or three decimal places: 23.98, 29.97, 59.94. Other rates
+/// have three: none in use needs more.
 fn decimal(number: f64) -> FrameRate {
     let thousandths = (number * 1000.0).round() as u32;
+    let nominal = (number * 1.001).round();
     if thousandths.is_multiple_of(1000) {
         FrameRate { frames: thousandths / 1000, seconds: 1 }
+    } else if nominal >= 1.0 && (number - nominal / 1.001).abs() <= NTSC_TOLERANCE {
+        FrameRate { frames: nominal as u32 * 1000, seconds: 1001 }
     } else {
         FrameRate { frames: thousandths, seconds: 1000 }
     }
+}
+
+/// What a user should know about the frame rate in the text of a scene: that a decimal is taken as a fraction of 1001.
+#[must_use]
+pub fn frame_rate_remark(text: &str) -> Option<String> {
+    let root = crate::parse_values(text).ok()?;
+    let Value::Number(number) = ValuePath::root().key("picture").key("fps").find(&root)?.value else { return None };
+    let rate = (0.0..=1e6).contains(&number).then(|| decimal(number))?;
+    let taken = format!("{number} frames per second are taken as \"{}/{}\"", rate.frames, rate.seconds);
+    (rate.seconds == 1001).then_some(taken)
 }
 
 impl Parameter for FrameRate {
@@ -99,7 +114,8 @@ bansho_base::parameters! {
         frames: i64 = 240, limits(Range::new(1.0, 10_000_000.0)), unit("frames");
         /// Number of the first frame, at time 0.
         first_frame: i64 = 0, limits(Range::new(-1_000_000.0, 10_000_000.0));
-        /// Frames per second, as a number or as a fraction such as "24000/1001".
+        /// Frames per second, as a number or as a fraction such as "24000/1001". A decimal within 0.01 of n * 1000/1001, such as 23.98 or 29.97, is taken as
+        /// that fraction.
         fps: FrameRate = FrameRate { frames: 30, seconds: 1 }, unit("1/s");
         /// Exposure value at ISO 100, or "auto": that of the plate; without a plate, measured once for the shot from the luminance of the scene.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-40.0, 40.0)), unit("EV");
@@ -171,75 +187,45 @@ bansho_base::parameters! {
     }
 }
 
-bansho_base::choice! {
-    /// Kind of light.
-    pub enum LightKind {
-        /// Emits from a point in all directions.
-        Point = "point",
-        /// Emits from infinitely far away.
-        Directional = "directional",
-        /// Emits from a point within a cone.
-        Spot = "spot",
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-bansho_base::parameters! {
-    /// A lamp, the moon or the sun. A scene with only rain that states neither sky, ground nor light is lit by three street lamps.
-    pub struct LightParameters {
-        /// Kind of light.
-        kind: LightKind = LightKind::Point;
-        /// Position (point and spot).
-        position: Animated<[f64; 3]> = Animated::from([0.0, 3.0, 0.0]), unit("m");
-        /// Direction of the emitted light (directional and spot).
-        direction: Animated<[f64; 3]> = Animated::from([0.0, -1.0, 0.0]);
-        /// Linear sRGB color; its luminance is scaled to `intensity`.
-        color: [f64; 3] = [1.0, 0.9, 0.75], limits(Range::new(0.0, 1.0));
-        /// Luminous intensity (candela) of points and spots, illuminance (lux) of directional lights.
-        intensity: Animated<f64> = Animated::from(100.0), limits(Range::new(0.0, 1e9)), unit("cd or lx");
-        /// Radius of the sphere that emits the light (point and spot).
-        radius: f64 = 0.05, limits(Range::new(1e-4, 100.0)), unit("m");
-        /// Whether the sphere itself is visible.
-        visible: bool = false;
-        /// Angle from the axis up to which a spot has full intensity; at most `outer_cone_deg`.
-        inner_cone_deg: f64 = 15.0, limits(Range::new(0.0, 89.0)), unit("degrees");
-        /// Angle from the axis beyond which a spot has no intensity.
-        outer_cone_deg: f64 = 30.0, limits(Range::new(0.1, 90.0)), unit("degrees");
-    }
-}
-
-impl LightParameters {
-    /// Whether it has a direction.
-    pub fn is_directed(&self) -> bool {
-        self.kind != LightKind::Point
+    fn read(value: Value) -> Option<[u32; 2]> {
+        let node = Node { value, span: 0..1 };
+        FrameRate::read(&node, &(), "", &mut Reader::new()).map(|rate| [rate.frames, rate.seconds])
     }
 
-    /// Whether the vector of its direction is not zero at any key.
-    pub fn has_valid_direction(&self) -> bool {
-        self.direction.values().into_iter().all(|direction| DVec3::from(direction).try_normalize().is_some())
+    #[test]
+    fn decimals_near_a_rate_of_ntsc_are_that_rate() {
+        for n in [24, 30, 48, 60, 72, 90, 96, 100, 120, 144, 240, 480_u32] {
+            let exact = f64::from(n) / 1.001;
+            for number in [exact, (exact * 1e3).round() / 1e3, (exact * 1e2).round() / 1e2, (exact * 1e3).floor() / 1e3]
+            {
+                assert_eq!(read(Value::Number(number)), Some([n * 1000, 1001]), "{number}");
+            }
+        }
+        let others = [
+            (24.0, [24, 1]),
+            (12.5, [25, 2]),
+            (59.9, [599, 10]),
+            (23.9, [239, 10]),
+            (24.99, [2499, 100]),
+            (15.625, [125, 8]),
+        ];
+        for (number, [frames, seconds]) in others {
+            let [found_frames, found_seconds] = read(Value::Number(number)).unwrap();
+            assert_eq!(found_frames * seconds, frames * found_seconds, "{number}");
+        }
+        assert_eq!(read(Value::Integer(60)), Some([60, 1]));
+        assert_eq!(read(Value::Text("2997/125".into())), Some([2997, 125]), "what is stated exactly stays");
     }
 
-    /// Whether it has a position.
-    pub fn has_position(&self) -> bool {
-        self.kind != LightKind::Directional
-    }
-
-    /// The light at time `t`.
-    pub fn at(&self, t: f64) -> Light {
-        let position = DVec3::from(self.position.at(t));
-        let direction = DVec3::from(self.direction.at(t)).try_normalize().unwrap_or(-DVec3::Y);
-        let emitter = match self.kind {
-            LightKind::Point => Emitter::Point { position, radius: self.radius },
-            LightKind::Directional => Emitter::Directional { toward: -direction },
-            LightKind::Spot => Emitter::Spot {
-                position,
-                axis: direction,
-                cos_inner: math::cos(self.inner_cone_deg.min(self.outer_cone_deg).to_radians()),
-                cos_outer: math::cos(self.outer_cone_deg.to_radians()),
-            },
-        };
-        let color = bansho_base::color::acescg_from_srgb(self.color.map(|value| value as f32));
-        let luminance = bansho_base::color::luminance(color).max(1e-6);
-        let scale = self.intensity.at(t) as f32 / luminance;
-        Light { emitter, intensity: color.map(|value| value * scale) }
+    #[test]
+    fn what_a_decimal_is_taken_as_is_told() {
+        let told = |fps: &str| frame_rate_remark(&format!("bansho = 2\n[picture]\nfps = {fps}\n"));
+        assert_eq!(told("23.98").unwrap(), "23.98 frames per second are taken as \"24000/1001\"");
+        assert_eq!(["24", "24.0", "12.5", "\"24000/1001\"", "1e99"].map(told), [const { None }; 5]);
+        assert_eq!(frame_rate_remark("bansho = 2\n"), None);
     }
 }

@@ -9,7 +9,7 @@ use bansho_base::{
 };
 
 use super::{
-    depth::{self, DepthFit, DepthScale, KnownDepthError},
+    depth::{self, DepthDoubt, DepthFit, DepthScale, DepthValues, KnownDepthError},
     ground_fit::{self, GroundFit, PlateView},
     picture::{DepthKind, PlateAlpha, PlateParameters},
 };
@@ -82,6 +82,20 @@ pub enum PlateRemark {
         /// Size of the image, pixels.
         image: [usize; 2],
     },
+    /// The depth has negative values alone.
+    #[error(
+        "the depth is negative, as z of a camera that looks toward -z, so its values are used without their sign: {nearest} is the nearest, {farthest} the \
+         farthest"
+    )]
+    NegativeDepth {
+        /// Largest value.
+        nearest: f32,
+        /// Smallest value.
+        farthest: f32,
+    },
+    /// The depth hides nothing, or everything.
+    #[error("the depth: {0}")]
+    DepthDoubt(DepthDoubt),
     /// Scale and shift were found from known depths.
     #[error("`depth_known`: {0}")]
     DepthFit(DepthFit),
@@ -208,6 +222,13 @@ impl PlateParameters {
             depth.scale = found.scale();
             remarks.push(PlateRemark::GroundFit(found));
         }
+        let values = DepthValues::of(depth.values());
+        if self.depth_kind != DepthKind::Inverse && values.are_negative() {
+            depth.scale.meters = -meters;
+            let [farthest, nearest] = values.range;
+            remarks.push(PlateRemark::NegativeDepth { nearest, farthest });
+        }
+        remarks.extend(values.doubt(&depth.scale, view.camera.near).map(PlateRemark::DepthDoubt));
         Ok(Some(depth))
     }
 }

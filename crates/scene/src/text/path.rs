@@ -86,3 +86,12 @@ pub(crate) fn nearest_span(root: &Table, path: &str) -> Option<Span> {
     }
     span
 }
+
+/// Whether the scene `root` states the value at a dotted path.
+pub(crate) fn is_stated(root: &Table, path: &str) -> bool {
+    let then = |path: ValuePath, segment: &str| match segment.parse() {
+        Ok(index) => path.index(index),
+        Err(_) => path.key(segment),
+    };
+    path.split('.').fold(ValuePath::root(), then).find(root).is_some()
+}

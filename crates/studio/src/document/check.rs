@@ -15,7 +15,7 @@ use bansho::{
     },
 };
 
-use super::descriptors;
+use super::{descriptors, editor_hints::editor_hints};
 
 /// The scene with the default options of `bansho render`.
 fn parse(name: &str, text: &str) -> Result<Arc<Scene>, SceneError> {
@@ -167,7 +167,7 @@ fn draft_operations(root: &Table) -> Vec<Operation> {
     for kind in KINDS {
         let Some(Value::List(all)) = root.get(kind.key).map(|node| &node.value) else { continue };
         for index in 0..all.len() {
-            for limit in kind.editor_hints.draft_limits {
+            for limit in editor_hints(kind.key).draft_limits {
                 let path = descriptors::within(&ValuePath::root().key(kind.key).index(index), limit.key);
                 if effective_number(root, &path).is_some_and(|number| number > limit.max as f64) {
                     operations.push(Operation::Set { path, value: Value::Integer(limit.max) });

@@ -4,20 +4,20 @@ use bansho::{
     KINDS,
     base::{
         parameters::{Descriptor, Kind, TableDescriptor},
-        phenomenon::kind::PhenomenonKind,
+        tables::{self, TableKind},
     },
-    scene::{SHARED_TABLES, Segment, ValuePath},
+    phenomena,
+    scene::{Segment, ValuePath},
 };
 
 /// The kind of phenomenon called `key` in scene files.
-pub(crate) fn phenomenon_kind(key: &str) -> Option<&'static PhenomenonKind> {
-    KINDS.iter().find(|kind| kind.key == key)
+pub(crate) fn phenomenon_kind(key: &str) -> Option<&'static TableKind> {
+    phenomena().find(|kind| kind.key == key)
 }
 
 /// The parameters of the table `key` of a scene: a shared one, or a phenomenon's.
 pub(crate) fn table_descriptor(key: &str) -> Option<&'static TableDescriptor> {
-    let shared = SHARED_TABLES.iter().find(|table| table.key == key).map(|table| (table.table)());
-    shared.or_else(|| phenomenon_kind(key).map(|kind| (kind.table)()))
+    tables::find(KINDS, key).map(|kind| (kind.table)())
 }
 
 /// The descriptor of the parameter at `path`. All items of a list have the same descriptors.
@@ -52,37 +52,4 @@ fn inner_table(kind: &Kind) -> Option<&'static TableDescriptor> {
 /// The path of a key whose sub-tables are separated by dots (`particles.count`), within the table at `path`.
 pub(crate) fn within(path: &ValuePath, dotted_key: &str) -> ValuePath {
     dotted_key.split('.').fold(path.clone(), |path, key| path.key(key))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn editor_hints_name_parameters() {
-        for kind in KINDS {
-            let hints = kind.editor_hints;
-            let find = |key: &str| descriptor(&within(&ValuePath::root().key(kind.key), key));
-            for limit in hints.draft_limits {
-                assert!(find(limit.key).is_some_and(|own| matches!(own.kind, Kind::Integer { .. })), "{}", limit.key);
-            }
-            if let Some(handles) = hints.position_handles {
-                assert!(find(handles.key).is_some(), "{}", handles.key);
-                if let Some(items) = handles.items {
-                    assert!(find(&format!("{items}.{}", handles.key)).is_some(), "{items}");
-                }
-            }
-            if let Some(import) = hints.mesh_import {
-                let shape = find(&format!("{}.{}", import.list, import.shape_key)).map(|own| &own.kind);
-                let is_choice = |choices: &[bansho::base::parameters::Choice]| {
-                    choices.iter().any(|choice| choice.name == import.shape)
-                };
-                assert!(matches!(shape, Some(Kind::Choice(choices)) if is_choice(choices)), "{}", import.shape);
-                assert!(find(&format!("{}.{}", import.list, import.file_key)).is_some(), "{}", import.file_key);
-            }
-            if let Some(key) = hints.stage_key {
-                assert!(find(key).is_some_and(|own| matches!(own.kind, Kind::Choice(_))), "{key}");
-            }
-        }
-    }
 }

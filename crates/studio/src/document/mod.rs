@@ -2,6 +2,7 @@
 
 mod check;
 pub(crate) mod descriptors;
+pub(crate) mod editor_hints;
 pub mod files;
 mod history;
 pub(crate) mod keyframes;

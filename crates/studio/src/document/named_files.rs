@@ -3,7 +3,7 @@
 use bansho::{
     KINDS,
     base::parameters::{Kind, Node, Table, TableDescriptor, Value},
-    scene::{SHARED_TABLES, ValuePath},
+    scene::ValuePath,
 };
 
 /// A parameter that names a file.
@@ -17,10 +17,8 @@ pub struct FileReference {
 
 /// All parameters of the scene `root` that name files.
 pub fn named_files(root: &Table) -> Vec<FileReference> {
-    let shared = SHARED_TABLES.iter().map(|table| (table.key, (table.table)()));
-    let kinds = KINDS.iter().map(|kind| (kind.key, (kind.table)()));
     let mut found = Vec::new();
-    for (key, descriptor) in shared.chain(kinds) {
+    for (key, descriptor) in KINDS.iter().map(|kind| (kind.key, (kind.table)())) {
         let path = ValuePath::root().key(key);
         match root.get(key).map(|node| &node.value) {
             Some(Value::Table(table)) => collect_from_table(&path, table, descriptor, &mut found),

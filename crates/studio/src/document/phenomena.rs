@@ -1,12 +1,11 @@
 //! The list of the phenomena of a scene, and the operations on it: add, duplicate, hide, solo.
 
 use bansho::{
-    KINDS,
     base::parameters::{Table, Value},
     scene::{Segment, ValuePath, operation::Operation},
 };
 
-use super::{Document, descriptors};
+use super::{Document, descriptors, editor_hints::editor_hints};
 
 /// A phenomenon of a scene: its kind, and its index among the phenomena of that kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,8 +31,7 @@ impl PhenomenonId {
 /// Whether a list without items at `path` is equivalent to a list with one item that has default values.
 pub(crate) fn implies_one_item(path: &ValuePath) -> bool {
     let [Segment::Key(kind), Segment::Index(_), Segment::Key(list)] = path.segments() else { return false };
-    let handles = descriptors::phenomenon_kind(kind).and_then(|kind| kind.editor_hints.position_handles);
-    handles.and_then(|handles| handles.items).is_some_and(|items| items == list)
+    editor_hints(kind).position_handles.is_some_and(|handles| handles.items == list)
 }
 
 /// A phenomenon as the text lists it. Its parameters may be invalid.
@@ -52,7 +50,7 @@ impl Document {
     pub fn phenomena(&self) -> Vec<PhenomenonEntry> {
         let mut entries = Vec::new();
         for entry in &self.values().entries {
-            let Some(kind) = KINDS.iter().find(|kind| kind.key == entry.key) else { continue };
+            let Some(kind) = descriptors::phenomenon_kind(&entry.key) else { continue };
             let Value::List(items) = &entry.node.value else { continue };
             let tables = items.iter().enumerate().filter_map(|(index, item)| match &item.value {
                 Value::Table(table) => Some((index, table)),

@@ -9,16 +9,18 @@ use bansho::{
         color::ev100_of_white_luminance,
         math,
         parameters::{Auto, Kind, Table, Value},
-        phenomenon::editor_hints::StageView,
     },
     scene::{
-        Instance, PlateParameters, Scene, ValuePath,
+        Instance, PlateParameters, Scene, SharedTables, ValuePath,
         operation::{self, Operation},
         parse_values,
     },
 };
 
-use super::{PhenomenonId, PlannedScene, descriptors};
+use super::{
+    PhenomenonId, PlannedScene, descriptors,
+    editor_hints::{StageView, editor_hints},
+};
 
 /// Size of a stage's picture, pixels.
 const SIZE: [usize; 2] = [112, 112];
@@ -31,8 +33,8 @@ const MARGIN_FACTOR: f64 = 1.08;
 
 /// The names of the stages of `kind` in a scene, in order, without the finished phenomenon. Empty where the kind has no stages.
 pub fn names(kind: &str) -> Vec<&'static str> {
-    let key = descriptors::phenomenon_kind(kind).and_then(|kind| kind.editor_hints.stage_key);
-    let parameter = key.and_then(|key| descriptors::descriptor(&ValuePath::root().key(kind).key(key)));
+    let Some(stages) = editor_hints(kind).stages else { return Vec::new() };
+    let parameter = descriptors::descriptor(&ValuePath::root().key(kind).key(stages.key));
     let Some((Kind::Choice(choices), default)) = parameter.map(|own| (&own.kind, &own.default)) else {
         return Vec::new();
     };
@@ -54,13 +56,13 @@ pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, phenomenon: Pheno
 
 /// The scene `text` with `phenomenon` at the origin, once, at `stage`.
 fn stage_text(text: &str, root: &Table, phenomenon: PhenomenonId, stage: &str) -> Option<String> {
-    let hints = descriptors::phenomenon_kind(phenomenon.kind)?.editor_hints;
+    let hints = editor_hints(phenomenon.kind);
     let path = phenomenon.path();
     let stage = Value::Text(stage.to_owned());
-    let mut operations = vec![Operation::Set { path: path.key(hints.stage_key?), value: stage }];
+    let mut operations = vec![Operation::Set { path: path.key(hints.stages?.key), value: stage }];
     if let Some(handles) = hints.position_handles {
         operations.push(Operation::Set { path: path.key(handles.key), value: Value::numbers([0.0; 3]) });
-        let items = handles.items.map(|items| path.key(items)).filter(|items| items.find(root).is_some());
+        let items = Some(path.key(handles.items)).filter(|items| items.find(root).is_some());
         operations.extend(items.map(|path| Operation::Remove { path }));
     }
     operation::apply(text, &operations).ok()
@@ -71,17 +73,15 @@ fn stage_scene(name: &str, text: &str, phenomenon: PhenomenonId) -> Option<Scene
     let scene = Scene::parse(name, text, KINDS).ok()?;
     let mut of_kind = scene.instances.iter().filter(|instance| instance.kind.key == phenomenon.kind);
     let alone = Instance { enabled: true, ..of_kind.nth(phenomenon.index)?.clone() };
-    let StageView { size_m, white_luminance } = alone.parameters.stage_view()?;
+    let view = editor_hints(phenomenon.kind).stages?.view;
+    let StageView { size_m, white_luminance } = view(alone.parameters.as_ref())?;
     let mut picture = scene.picture.clone();
     picture.exposure_ev100 = white_luminance.map_or(Auto::Auto, |white| Auto::Set(ev100_of_white_luminance(white)));
     let scene = Scene {
         picture,
         camera: camera(size_m),
         plate: PlateParameters::default(),
-        sky: None,
-        ground: None,
-        lights: Vec::new(),
-        obstacles: Vec::new(),
+        tables: SharedTables::default(),
         instances: vec![alone],
         ..scene
     };

@@ -2,7 +2,9 @@
 
 use std::{ffi::OsString, path::PathBuf};
 
-use super::{USAGE, renderer_choice::RendererChoice};
+use bansho_studio::renderer_choice::RendererChoice;
+
+use super::USAGE;
 
 /// The parsed arguments.
 #[derive(Debug, PartialEq)]
@@ -15,9 +17,6 @@ pub(super) struct Arguments {
 #[derive(Debug, PartialEq)]
 pub(super) enum Mode {
     Help,
-    /// Benchmarks of phenomena whose name contains this.
-    Bench(String),
-    BenchWindow(String),
     Scene(Option<PathBuf>),
 }
 
@@ -46,14 +45,9 @@ impl Arguments {
         let text = |argument: &OsString| argument.to_string_lossy().into_owned();
         let mode = match rest.as_slice() {
             [] => Mode::Scene(None),
-            [option, name @ ..] if name.len() < 2 && text(option).starts_with("--") => {
-                let wanted = name.first().map(text).unwrap_or_default();
-                match text(option).as_str() {
-                    "--help" if name.is_empty() => Mode::Help,
-                    "--bench" => Mode::Bench(wanted),
-                    "--bench-window" => Mode::BenchWindow(wanted),
-                    other => return Err(format!("error: {other} means nothing here\n{USAGE}")),
-                }
+            [option] if text(option) == "--help" => Mode::Help,
+            [option, ..] if text(option).starts_with("--") => {
+                return Err(format!("error: {} means nothing here\n{USAGE}", text(option)));
             }
             [scene] => Mode::Scene(Some(scene.into())),
             _ => return Err(USAGE.to_owned()),
@@ -77,8 +71,8 @@ mod tests {
         for arguments in [["--painter", "software", "a.toml"], ["a.toml", "--painter", "software"]] {
             assert_eq!(parsed(&arguments).unwrap().renderer, RendererChoice::Software);
         }
-        let bench = parsed(&["--bench-window", "rain", "--painter=gpu"]).unwrap();
-        assert_eq!(bench, Arguments { renderer: RendererChoice::Gpu, mode: Mode::BenchWindow("rain".into()) });
+        let help = parsed(&["--help", "--painter=gpu"]).unwrap();
+        assert_eq!(help, Arguments { renderer: RendererChoice::Gpu, mode: Mode::Help });
     }
 
     #[test]

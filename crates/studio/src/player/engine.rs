@@ -76,7 +76,7 @@ impl Engine {
     /// Serves `request` and reports to `emit`. Stops when `observer` cancels; another call then continues.
     ///
     /// # Errors
-    /// No picture can be drawn or made a file, or the observer asked to stop.
+    /// No picture can be drawn or encoded as a PNG, or the observer asked to stop.
     pub(super) fn process(
         &mut self,
         request: &FrameRequest,

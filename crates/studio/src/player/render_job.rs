@@ -12,7 +12,7 @@ use std::{
 use bansho::{
     Observer,
     job::{FrameDone, Job, JobError, JobObserver, JobStarted, SceneFile},
-    media::assets::InputLimits,
+    media::{assets::InputLimits, files::naming::default_sequence},
 };
 
 /// A running job.
@@ -71,7 +71,7 @@ pub fn job(text: &str, path: &Path, number: Option<i64>) -> Job {
         changes: Vec::new(),
         input_limits: InputLimits::default(),
     };
-    let out = scene.folder.join("out").join(&scene.stem).join(format!("{}.####.png", scene.stem));
+    let out = scene.folder.join("out").join(&scene.stem).join(default_sequence(&scene.stem));
     Job { resume: number.is_none(), frames: number.map(|number| vec![number]), out: Some(out), ..Job::new(scene) }
 }
 

@@ -282,7 +282,7 @@ fn file_of(text: &str, folder: &std::path::Path, number: i64) -> std::path::Path
 fn a_still_is_the_file_that_render_writes() {
     let folder = tempfile::tempdir().unwrap();
     let before = SCENE.replace("frames = 20", "frames = 20\nfirst_frame = -9\noverscan = 6");
-    for (text, number, name) in [(SCENE, 5, "scene.0005.png"), (&before, -5, "scene.-0005.png")] {
+    for (text, number, name) in [(SCENE, 5, "scene.0005.png"), (&before, -5, "scene.-005.png")] {
         let file = file_of(text, folder.path(), number);
         assert_eq!(file, folder.path().join("out/scene").join(name));
         let full_quality = FrameRequest { full_quality: true, revision: new_revision(text), ..request(text, number) };
@@ -381,7 +381,7 @@ fn rain_keeps_its_drops_while_the_wind_changes() {
     };
     let steady = drawn(&text("2.0"));
     let other_drops = difference(&steady, &drawn(&text("2.0").replace("size", "seed = 9\nsize")));
-    // After 30 s, drops that were carried from time 0 would stand 15 cm elsewhere.
+    // If the wind displaced drops from time 0 on, they would be 15 cm elsewhere after 30 s.
     let blown = difference(&steady, &drawn(&text("2.005")));
     assert!(blown > 0.0 && blown < 0.2 * other_drops, "{blown} of {other_drops}");
 }

@@ -8,7 +8,12 @@ use bansho::{
         geometry::{mesh::Mesh, strokes::Drawing},
         host::assets::{AssetError, AssetProblem, DepthMap, Picture, PictureLayers},
     },
-    media::assets::{decode_depth, decode_picture, gltf::decode_mesh, limits::MemoryLimit, svg::decode_drawing},
+    media::{
+        assets::{decode_depth, decode_picture},
+        gltf::decode_mesh,
+        limits::MemoryLimit,
+        svg::decode_drawing,
+    },
 };
 
 /// The embedded files, and files added by the user.

@@ -69,7 +69,7 @@ pub struct Session {
     /// Pictures of the stages, each with its serial number.
     stage_pictures: Vec<(Picture, u64)>,
     last_request: Option<LastRequest>,
-    /// Frames that panicked; they are not serial again.
+    /// Frames that panicked; they are not drawn again.
     panicked_frames: PanickedFrames,
     notice: Option<String>,
     frame_rate: FrameRate,
@@ -77,7 +77,7 @@ pub struct Session {
     seek_s: Option<f64>,
 }
 
-/// The last request.
+/// What a request depends on. A new one is sent only if this differs from the last request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LastRequest {
     revision: Revision,
@@ -121,7 +121,7 @@ impl Session {
         }
     }
 
-    /// Opens another document in path of this one.
+    /// Opens another document in place of this one.
     pub fn open(&mut self, document: Document, path: Option<PathBuf>) {
         self.assets = assets(&self.bundle, path.as_deref(), self.assets_for_folder);
         (self.document, self.path) = (document, path);
@@ -139,7 +139,7 @@ impl Session {
         self.retry();
     }
 
-    /// Draws frames that panicked once more.
+    /// Forgets which frames panicked, so that they are drawn again.
     pub fn retry(&mut self) {
         (self.last_request, self.panicked_frames) = (None, PanickedFrames::default());
     }
@@ -161,7 +161,7 @@ impl Session {
         self.stage_pictures.get(stage).map(|(picture, serial)| (picture, *serial))
     }
 
-    /// The last good plan.
+    /// The last valid plan.
     pub fn plan(&self) -> Option<&Arc<Plan>> {
         self.document.plan()
     }
@@ -322,22 +322,22 @@ impl Session {
     fn request(&mut self, viewport: [usize; 2], interactive: bool) {
         let scale = if interactive { self.preview_scale.scale() } else { 1.0 };
         let number = self.plan().map(|_| self.transport.number());
-        let last_request = LastRequest {
+        let next = LastRequest {
             revision: self.document.revision(),
             number,
             within: viewport.map(|side| ((side as f64 * scale).round() as usize).max(1)),
             draft: self.draft,
             stages: self.stages.filter(|_| !interactive || self.is_quick()),
         };
-        // While interactive, a frame is not serial again for another size.
+        // While interactive, a frame is not drawn again only because its size changed.
         let same = |last: LastRequest| {
-            last == LastRequest { within: if interactive { last.within } else { last_request.within }, ..last_request }
+            last == LastRequest { within: if interactive { last.within } else { next.within }, ..next }
         };
         if self.last_request.is_some_and(same) || self.has_panicked() {
             return;
         }
-        self.last_request = Some(last_request);
-        self.send(last_request, false);
+        self.last_request = Some(next);
+        self.send(next, false);
     }
 
     /// Whether the scene is drawn fast enough to draw the stages too.
@@ -354,16 +354,16 @@ impl Session {
         }
     }
 
-    fn send(&mut self, last_request: LastRequest, exact: bool) {
-        let request = self.request_for(last_request, exact);
+    fn send(&mut self, inputs: LastRequest, exact: bool) {
+        let request = self.request_for(inputs, exact);
         self.player.request(request);
     }
 
     /// The request for the full-quality frame `number`, for another player than this session's.
     pub fn full_quality_request(&self, number: i64) -> FrameRequest {
         let revision = self.document.revision();
-        let last_request = LastRequest { revision, number: Some(number), within: [1; 2], draft: false, stages: None };
-        FrameRequest { full_quality: true, ..self.request_for(last_request, true) }
+        let inputs = LastRequest { revision, number: Some(number), within: [1; 2], draft: false, stages: None };
+        FrameRequest { full_quality: true, ..self.request_for(inputs, true) }
     }
 
     /// The bytes of a bundled or added file.
@@ -376,18 +376,18 @@ impl Session {
         self.bundle.added_files()
     }
 
-    fn request_for(&self, last_request: LastRequest, exact: bool) -> FrameRequest {
+    fn request_for(&self, inputs: LastRequest, exact: bool) -> FrameRequest {
         FrameRequest {
-            revision: last_request.revision,
+            revision: inputs.revision,
             name: self.document.name().to_owned(),
             text: self.document.text().clone(),
             assets: self.assets.clone(),
-            number: last_request.number,
-            within: last_request.within,
+            number: inputs.number,
+            within: inputs.within,
             exact,
-            draft: last_request.draft,
+            draft: inputs.draft,
             full_quality: false,
-            stages: last_request.stages,
+            stages: inputs.stages,
         }
     }
 

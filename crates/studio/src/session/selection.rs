@@ -1,9 +1,6 @@
 //! What is selected: a table of the scene, whose parameters the inspector shows.
 
-use bansho::{
-    base::parameters::TableDescriptor,
-    scene::{SHARED_TABLES, ValuePath},
-};
+use bansho::{KINDS, base::parameters::TableDescriptor, scene::ValuePath};
 
 use crate::document::{Document, PhenomenonId, descriptors};
 
@@ -18,7 +15,7 @@ pub(crate) struct Selection {
 
 impl Default for Selection {
     fn default() -> Self {
-        Self { key: SHARED_TABLES[0].key, index: None }
+        Self { key: KINDS[0].key, index: None }
     }
 }
 

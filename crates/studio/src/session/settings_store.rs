@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+#[cfg(not(target_arch = "wasm32"))]
+use bansho::media::files::{atomic, overwrite_policy::OverwritePolicy};
+
 /// A key-value store of texts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SettingsStore {
@@ -37,7 +40,8 @@ impl SettingsStore {
     /// Stores `text` as `name`. Returns whether that succeeded.
     #[cfg(not(target_arch = "wasm32"))]
     pub(crate) fn write(&self, name: &str, text: &str) -> bool {
-        self.file(name).is_none_or(|file| bansho::media::files::atomic::write_bytes(&file, text.as_bytes()).is_ok())
+        let policy = OverwritePolicy::any().without_links();
+        self.file(name).is_none_or(|file| atomic::write_bytes(&file, text.as_bytes(), &policy).is_ok())
     }
 
     /// The stored text `name`.

@@ -5,7 +5,7 @@ use bansho_base::math;
 
 use super::{
     Emission, PHOTONS_PER_KILORAYLEIGH,
-    emitter::{EMITTERS, Emitter, PerEmitter},
+    emitter::{EMITTERS, PerEmitter, SpectralEmitter},
     excitation::DIRECT_PHOTONS,
     quenching::natural_lifetime,
 };
@@ -43,10 +43,10 @@ pub fn thermal_speed(temperature: f64, mass_u: f64) -> f64 {
 /// With the radius of the electrons' collisions, 3.2e-11 m, a tenth of the green light is left at 110 km and nearly all above 150 km. With that of a
 /// molecule, 1.85e-10 m, none is left below 190 km, which is not observed: few contacts with a molecule quench O(1S).
 #[must_use]
-pub fn hard_sphere_quenching(emitter: Emitter, air: &AirLevel, radius: f64) -> f64 {
+pub fn hard_sphere_quenching(emitter: SpectralEmitter, air: &AirLevel, radius: f64) -> f64 {
     let mass_u = match emitter {
-        Emitter::OxygenGreen | Emitter::OxygenRed => 15.999,
-        Emitter::NitrogenIon | Emitter::Nitrogen => 28.014,
+        SpectralEmitter::OxygenGreen | SpectralEmitter::OxygenRed => 15.999,
+        SpectralEmitter::NitrogenIon | SpectralEmitter::Nitrogen => 28.014,
     };
     let cross_section = std::f64::consts::PI * radius * radius;
     let rate = std::f64::consts::SQRT_2 * air.number_density() * cross_section * thermal_speed(air.temperature, mass_u);
@@ -60,8 +60,8 @@ pub fn hard_sphere_quenching(emitter: Emitter, air: &AirLevel, radius: f64) -> f
 pub fn mean_hard_sphere_photons(air: &AirLevel, radius: f64) -> PerEmitter<f64> {
     EMITTERS.map(|emitter| {
         let struck = match emitter {
-            Emitter::OxygenGreen | Emitter::OxygenRed => air.o,
-            Emitter::NitrogenIon | Emitter::Nitrogen => air.n2,
+            SpectralEmitter::OxygenGreen | SpectralEmitter::OxygenRed => air.o,
+            SpectralEmitter::NitrogenIon | SpectralEmitter::Nitrogen => air.n2,
         };
         let radiated = 1.0 - hard_sphere_quenching(emitter, air, radius);
         struck / air.number_density() * DIRECT_PHOTONS[emitter.index()] * radiated
@@ -100,7 +100,7 @@ mod tests {
     fn difference(table: &Emission, energy_ev: f64, found: &[PerEmitter<f64>]) -> PerEmitter<f64> {
         let profile = table.profile(energy_ev);
         std::array::from_fn(|i| {
-            let together = if i == Emitter::OxygenRed.index() { 20 } else { 1 };
+            let together = if i == SpectralEmitter::OxygenRed.index() { 20 } else { 1 };
             let sums = |levels: &[PerEmitter<f64>]| -> Vec<f64> {
                 levels.chunks(together).map(|chunk| chunk.iter().map(|photons| photons[i]).sum()).collect()
             };
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn green_survives_the_radius_of_the_collisions_and_not_that_of_a_molecule() {
         let left = |altitude_km, radius| {
-            1.0 - hard_sphere_quenching(Emitter::OxygenGreen, &atmosphere().at(altitude_km), radius)
+            1.0 - hard_sphere_quenching(SpectralEmitter::OxygenGreen, &atmosphere().at(altitude_km), radius)
         };
         for (altitude_km, of_collisions, of_molecules) in
             [(115.0, 0.16, 0.0), (120.0, 0.35, 0.0), (130.0, 0.64, 0.0), (150.0, 0.87, 0.01)]
@@ -137,12 +137,12 @@ mod tests {
             assert!((found[0] - of_collisions).abs() < 0.006, "{altitude_km}: {found:?}");
             assert!((found[1] - of_molecules).abs() < 0.006, "{altitude_km}: {found:?}");
         }
-        assert!(hard_sphere_quenching(Emitter::NitrogenIon, &atmosphere().at(110.0), 1.85e-10) < 1e-3);
+        assert!(hard_sphere_quenching(SpectralEmitter::NitrogenIon, &atmosphere().at(110.0), 1.85e-10) < 1e-3);
     }
 
     /// What shines after a collision, drawn by the rules of the thesis.
-    fn drawn(air: &AirLevel, radius: f64, uniforms: [f64; 3]) -> Option<Emitter> {
-        use Emitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
+    fn drawn(air: &AirLevel, radius: f64, uniforms: [f64; 3]) -> Option<SpectralEmitter> {
+        use SpectralEmitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
         let species_draw = uniforms[0] * air.number_density();
         let struck = match species_draw {
             species_draw if species_draw < air.o => [OxygenGreen, OxygenRed],

@@ -17,7 +17,7 @@ const PLANCK_TIMES_LIGHT_SPEED: f64 = 6.626_070_15e-34 * 299_792_458.0;
 
 /// An excited state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Emitter {
+pub enum SpectralEmitter {
     /// O(1S): green, lifetime 0.75 s. Counted in photons of 557.7 nm.
     OxygenGreen,
     /// O(1D): red, radiative lifetime 134 s, shorter where it is quenched. Counted in photons of 630.0 nm.
@@ -32,8 +32,8 @@ pub enum Emitter {
 pub type PerEmitter<T> = [T; 4];
 
 /// All emitters.
-pub const EMITTERS: PerEmitter<Emitter> =
-    [Emitter::OxygenGreen, Emitter::OxygenRed, Emitter::NitrogenIon, Emitter::Nitrogen];
+pub const EMITTERS: PerEmitter<SpectralEmitter> =
+    [SpectralEmitter::OxygenGreen, SpectralEmitter::OxygenRed, SpectralEmitter::NitrogenIon, SpectralEmitter::Nitrogen];
 
 /// A spectral line or band.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,25 +43,25 @@ pub struct Line {
     /// Wavelength in air, nm.
     pub wavelength_nm: f64,
     /// The upper state.
-    pub emitter: Emitter,
+    pub emitter: SpectralEmitter,
     /// Photons of this line per photon in which the emitter is counted.
     pub photons: f64,
 }
 
-const fn line(name: &'static str, wavelength_nm: f64, emitter: Emitter, photons: f64) -> Line {
+const fn line(name: &'static str, wavelength_nm: f64, emitter: SpectralEmitter, photons: f64) -> Line {
     Line { name, wavelength_nm, emitter, photons }
 }
 
 /// Lines that AOVs and tests measure separately. Ratios: 630.0/636.4 Sharpee & Slanger (2006); first negative bands and
 /// 670.5 nm, a band of the first positive system, Vallance Jones (1974).
 pub const LINES: [Line; 7] = [
-    line("O 557.7 nm", 557.734, Emitter::OxygenGreen, 1.0),
-    line("O 630.0 nm", 630.03, Emitter::OxygenRed, 1.0),
-    line("O 636.4 nm", 636.378, Emitter::OxygenRed, 1.0 / 2.997),
-    line("N2+ 391.4 nm", 391.44, Emitter::NitrogenIon, 3.28),
-    line("N2+ 427.8 nm", 427.81, Emitter::NitrogenIon, 1.0),
-    line("N2+ 470.9 nm", 470.92, Emitter::NitrogenIon, 0.201),
-    line("N2 670.5 nm", 670.48, Emitter::Nitrogen, 0.021_44),
+    line("O 557.7 nm", 557.734, SpectralEmitter::OxygenGreen, 1.0),
+    line("O 630.0 nm", 630.03, SpectralEmitter::OxygenRed, 1.0),
+    line("O 636.4 nm", 636.378, SpectralEmitter::OxygenRed, 1.0 / 2.997),
+    line("N2+ 391.4 nm", 391.44, SpectralEmitter::NitrogenIon, 3.28),
+    line("N2+ 427.8 nm", 427.81, SpectralEmitter::NitrogenIon, 1.0),
+    line("N2+ 470.9 nm", 470.92, SpectralEmitter::NitrogenIon, 0.201),
+    line("N2 670.5 nm", 670.48, SpectralEmitter::Nitrogen, 0.021_44),
 ];
 
 bansho_base::choice! {
@@ -86,8 +86,8 @@ pub enum LineSet {
 impl LineSet {
     /// Wavelength, nm, and photons of each line or band of an emitter, per counted photon.
     #[must_use]
-    pub fn lines(self, emitter: Emitter) -> Vec<(f64, f64)> {
-        if self == Self::Observed && emitter == Emitter::Nitrogen {
+    pub fn lines(self, emitter: SpectralEmitter) -> Vec<(f64, f64)> {
+        if self == Self::Observed && emitter == SpectralEmitter::Nitrogen {
             return first_positive_bands();
         }
         let lines = LINES.iter().filter(|line| line.emitter == emitter && self.has(line));
@@ -102,7 +102,7 @@ impl LineSet {
 
     /// Absolute ACEScg color per kilorayleigh of the counted photons of an emitter; luminance in cd/m^2.
     #[must_use]
-    pub(crate) fn color_per_kilorayleigh(self, emitter: Emitter) -> [f64; 3] {
+    pub(crate) fn color_per_kilorayleigh(self, emitter: SpectralEmitter) -> [f64; 3] {
         static COLORS: LazyLock<[PerEmitter<[f64; 3]>; 2]> = LazyLock::new(|| {
             [LineSet::Observed, LineSet::Thesis].map(|set| EMITTERS.map(|emitter| color(set, emitter)))
         });
@@ -121,7 +121,7 @@ impl ColorMatching {
     }
 }
 
-impl Emitter {
+impl SpectralEmitter {
     /// Its index in [`EMITTERS`].
     #[must_use]
     pub const fn index(self) -> usize {
@@ -136,7 +136,7 @@ impl Emitter {
     }
 }
 
-fn color(set: LineSet, emitter: Emitter) -> [f64; 3] {
+fn color(set: LineSet, emitter: SpectralEmitter) -> [f64; 3] {
     let sum = set.lines(emitter).into_iter().fold([0.0; 3], |sum: [f64; 3], (wavelength_nm, photons)| {
         let xyz = absolute_xyz(wavelength_nm);
         std::array::from_fn(|i| sum[i] + photons * xyz[i])
@@ -205,17 +205,21 @@ mod tests {
     fn composite_of_the_first_positive_bands_agrees_with_the_reference() {
         // 5.68975e-6 cd/m^2 per kR of the bands in 575-780 nm alone.
         let visible: f64 = first_positive_bands().iter().map(|(_, weight)| weight).sum();
-        let found = luminance_of(Emitter::Nitrogen.color_per_kilorayleigh()) / visible;
+        let found = luminance_of(SpectralEmitter::Nitrogen.color_per_kilorayleigh()) / visible;
         assert!((found / 5.68975e-6 - 1.0).abs() < 0.02, "{found}");
     }
 
     #[test]
     fn saturated_lines_lie_outside_the_working_space() {
-        let negative = |emitter: Emitter| emitter.color_per_kilorayleigh().iter().any(|value| *value < 0.0);
-        assert!(negative(Emitter::OxygenGreen) || negative(Emitter::OxygenRed) || negative(Emitter::NitrogenIon));
-        let [r, g, b] = Emitter::OxygenGreen.color_per_kilorayleigh();
+        let negative = |emitter: SpectralEmitter| emitter.color_per_kilorayleigh().iter().any(|value| *value < 0.0);
+        assert!(
+            negative(SpectralEmitter::OxygenGreen)
+                || negative(SpectralEmitter::OxygenRed)
+                || negative(SpectralEmitter::NitrogenIon)
+        );
+        let [r, g, b] = SpectralEmitter::OxygenGreen.color_per_kilorayleigh();
         assert!(g > r.max(b));
-        let [r, g, b] = Emitter::NitrogenIon.color_per_kilorayleigh();
+        let [r, g, b] = SpectralEmitter::NitrogenIon.color_per_kilorayleigh();
         assert!(b > r.max(g));
     }
 }

@@ -7,7 +7,7 @@
 use bansho_base::math;
 
 use super::{
-    emitter::{Emitter, PerEmitter},
+    emitter::{PerEmitter, SpectralEmitter},
     quenching::radiated_fraction,
 };
 use crate::physics::atmosphere::AirLevel;
@@ -81,14 +81,14 @@ pub fn photons_per_ion_pair(air: &AirLevel) -> PerEmitter<f64> {
     let green_made = DIRECT_GREEN * pairs.o
         + TRANSFER_GREEN * pairs.n2 * n2a_transfer_fraction(air)
         + RECOMBINATION_GREEN * oxygen_ions;
-    let green = GREEN_TO_557 * green_made * radiated_fraction(Emitter::OxygenGreen, air);
+    let green = GREEN_TO_557 * green_made * radiated_fraction(SpectralEmitter::OxygenGreen, air);
     // Every 557.7 nm photon leaves an O(1D).
     let red_made = DIRECT_RED * pairs.o + RECOMBINATION_RED * oxygen_ions + green;
     [
         green,
-        RED_TO_630 * red_made * radiated_fraction(Emitter::OxygenRed, air),
-        ION_B * ION_B_TO_427 * pairs.n2 * radiated_fraction(Emitter::NitrogenIon, air),
-        NITROGEN_B * pairs.n2 * radiated_fraction(Emitter::Nitrogen, air),
+        RED_TO_630 * red_made * radiated_fraction(SpectralEmitter::OxygenRed, air),
+        ION_B * ION_B_TO_427 * pairs.n2 * radiated_fraction(SpectralEmitter::NitrogenIon, air),
+        NITROGEN_B * pairs.n2 * radiated_fraction(SpectralEmitter::Nitrogen, air),
     ]
 }
 

@@ -3,7 +3,7 @@
 use bansho_base::math;
 
 use super::{
-    emitter::Emitter,
+    emitter::SpectralEmitter,
     quenching::{lifetime, natural_lifetime},
 };
 use crate::physics::atmosphere::AirLevel;
@@ -32,7 +32,7 @@ impl LifetimeAndDiffusion {
     /// Of an emitter in this air. Excited atoms diffuse during their lifetime, with variance 2 D tau; it is visible in
     /// the red line only.
     #[must_use]
-    pub fn new(emitter: Emitter, air: &AirLevel) -> Self {
+    pub fn new(emitter: SpectralEmitter, air: &AirLevel) -> Self {
         let lifetime = lifetime(emitter, air);
         let moves = natural_lifetime(emitter) > PROMPT;
         Self { lifetime, diffusion_variance: if moves { 2.0 * diffusion_coefficient(air) * lifetime } else { 0.0 } }
@@ -61,9 +61,9 @@ mod tests {
     #[test]
     fn spread_is_meters_for_prompt_light_and_kilometers_for_red() {
         let root = |emitter, altitude_km| LifetimeAndDiffusion::new(emitter, &atmosphere().at(altitude_km)).spread(1e4);
-        assert!((root(Emitter::NitrogenIon, 110.0) - 6.74).abs() < 0.01);
-        assert!((10.0..100.0).contains(&root(Emitter::OxygenGreen, 110.0)));
-        assert!((5e3..2e4).contains(&root(Emitter::OxygenRed, 250.0)));
-        assert!(root(Emitter::OxygenRed, 110.0) < 100.0);
+        assert!((root(SpectralEmitter::NitrogenIon, 110.0) - 6.74).abs() < 0.01);
+        assert!((10.0..100.0).contains(&root(SpectralEmitter::OxygenGreen, 110.0)));
+        assert!((5e3..2e4).contains(&root(SpectralEmitter::OxygenRed, 250.0)));
+        assert!(root(SpectralEmitter::OxygenRed, 110.0) < 100.0);
     }
 }

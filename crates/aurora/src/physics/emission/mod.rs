@@ -15,7 +15,7 @@ pub mod red_line_altitudes;
 pub mod table;
 pub(crate) mod table_2_1;
 
-pub use emitter::{ColorMatching, EMITTERS, Emitter, LINES, Line, LineSet, PerEmitter};
+pub use emitter::{ColorMatching, EMITTERS, LINES, Line, LineSet, PerEmitter, SpectralEmitter};
 pub use table::Emission;
 
 /// Photon column emission rate of one kilorayleigh, m^-2 s^-1.

@@ -2,7 +2,7 @@
 
 use bansho_base::math;
 
-use super::emitter::{Emitter, PerEmitter};
+use super::emitter::{PerEmitter, SpectralEmitter};
 use crate::physics::atmosphere::AirLevel;
 
 /// Rate coefficient `A exp(B / T)`, m^3 s^-1.
@@ -67,13 +67,13 @@ const STATES: PerEmitter<ExcitedState> = [
 
 /// Radiative lifetime, s.
 #[must_use]
-pub(crate) fn natural_lifetime(emitter: Emitter) -> f64 {
+pub(crate) fn natural_lifetime(emitter: SpectralEmitter) -> f64 {
     STATES[emitter.index()].lifetime
 }
 
 /// Fraction of the excited states that radiate, `1 / (1 + tau sum k_q n_q)` (Stern-Volmer).
 #[must_use]
-pub fn radiated_fraction(emitter: Emitter, air: &AirLevel) -> f64 {
+pub fn radiated_fraction(emitter: SpectralEmitter, air: &AirLevel) -> f64 {
     let ExcitedState { lifetime, n2, o2, o } = STATES[emitter.index()];
     let t = air.temperature;
     1.0 / (1.0 + lifetime * (n2.at(t) * air.n2 + o2.at(t) * air.o2 + o.at(t) * air.o))
@@ -81,7 +81,7 @@ pub fn radiated_fraction(emitter: Emitter, air: &AirLevel) -> f64 {
 
 /// Effective lifetime with quenching, s: the radiative lifetime times the radiated fraction.
 #[must_use]
-pub fn lifetime(emitter: Emitter, air: &AirLevel) -> f64 {
+pub fn lifetime(emitter: SpectralEmitter, air: &AirLevel) -> f64 {
     natural_lifetime(emitter) * radiated_fraction(emitter, air)
 }
 
@@ -105,8 +105,8 @@ mod tests {
                 }
             }
             if fields[0] >= 80.0 {
-                assert!((lifetime(Emitter::OxygenRed, &air) / fields[6] - 1.0).abs() < 0.01);
-                assert!((lifetime(Emitter::OxygenGreen, &air) / fields[7] - 1.0).abs() < 0.01);
+                assert!((lifetime(SpectralEmitter::OxygenRed, &air) / fields[6] - 1.0).abs() < 0.01);
+                assert!((lifetime(SpectralEmitter::OxygenGreen, &air) / fields[7] - 1.0).abs() < 0.01);
             }
         }
         assert!(compared > 150, "{compared}");

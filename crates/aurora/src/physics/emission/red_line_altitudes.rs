@@ -3,7 +3,7 @@
 //! The afterglow stores red light for three altitudes, each with its own lifetime. Light between two of them is split
 //! by linear weights, so the decay is continuous in altitude.
 
-use super::{Emitter, PerEmitter};
+use super::{PerEmitter, SpectralEmitter};
 use crate::physics::atmosphere::level_altitude_km;
 
 /// Number of altitudes for which the afterglow stores red light.
@@ -26,8 +26,8 @@ pub(crate) fn red_altitude_weights(altitude_km: f64) -> [f64; RED_ALTITUDES] {
 #[must_use]
 pub(crate) fn red_by_altitude(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
     let divided = |(level, light): (usize, &PerEmitter<f64>)| {
-        let [low, middle, high] =
-            red_altitude_weights(level_altitude_km(level)).map(|weight| weight * light[Emitter::OxygenRed.index()]);
+        let [low, middle, high] = red_altitude_weights(level_altitude_km(level))
+            .map(|weight| weight * light[SpectralEmitter::OxygenRed.index()]);
         [low, middle, high, 0.0]
     };
     profile.iter().enumerate().map(divided).collect()
@@ -70,18 +70,18 @@ mod tests {
     fn errors(energy_ev: f64) -> [f64; 2] {
         let emission = Emission::new(atmosphere(), ARC);
         let (profile, air) = (emission.profile(energy_ev), atmosphere().levels());
-        let light: Vec<f64> = profile.iter().map(|light| light[Emitter::OxygenRed.index()]).collect();
+        let light: Vec<f64> = profile.iter().map(|light| light[SpectralEmitter::OxygenRed.index()]).collect();
         let whole: f64 = light.iter().sum();
         let by_height = red_by_altitude(&profile);
         let sums: [f64; RED_ALTITUDES] =
             std::array::from_fn(|altitude| by_height.iter().map(|light| light[altitude]).sum());
         let lifetimes = emission.red_lifetimes(energy_ev);
-        let column = emission.column(energy_ev).lifetime[Emitter::OxygenRed.index()];
+        let column = emission.column(energy_ev).lifetime[SpectralEmitter::OxygenRed.index()];
         let mut errors = [0.0_f64; 2];
         for second in 0..300 {
             let left = |lifetime: f64| math::exp(-f64::from(second) / lifetime);
             let exact: f64 =
-                (0..LEVELS).map(|level| light[level] * left(lifetime(Emitter::OxygenRed, &air[level]))).sum();
+                (0..LEVELS).map(|level| light[level] * left(lifetime(SpectralEmitter::OxygenRed, &air[level]))).sum();
             let found: f64 = (0..RED_ALTITUDES).map(|altitude| sums[altitude] * left(lifetimes[altitude])).sum();
             errors[0] = errors[0].max((found - exact).abs() / whole);
             errors[1] = errors[1].max((whole * left(column) - exact).abs() / whole);

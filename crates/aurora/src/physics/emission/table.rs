@@ -5,7 +5,7 @@ use bansho_base::math::lerp;
 use super::{
     PHOTONS_PER_KILORAYLEIGH,
     collisions::mean_hard_sphere_photons,
-    emitter::{EMITTERS, Emitter, LineSet, PerEmitter},
+    emitter::{EMITTERS, LineSet, PerEmitter, SpectralEmitter},
     excitation::photons_per_ion_pair,
     lifetime::LifetimeAndDiffusion,
     red_line_altitudes::{RED_ALTITUDES, mean_lifetimes},
@@ -76,7 +76,7 @@ impl Emission {
         let columns = (0..NODES)
             .map(|node| column(&photons, &persistence, deposition.spectrum_profile(node), node_energy_ev(node)))
             .collect();
-        let red = Emitter::OxygenRed.index();
+        let red = SpectralEmitter::OxygenRed.index();
         let red_lifetimes = |node: usize| {
             let light =
                 photons.iter().zip(deposition.spectrum_profile(node)).map(|(photons, pairs)| photons[red] * pairs);
@@ -189,7 +189,7 @@ fn column(
     pairs: &AltitudeProfile,
     energy_ev: f64,
 ) -> ColumnEmission {
-    let of = |emitter: Emitter| {
+    let of = |emitter: SpectralEmitter| {
         let light = |level: usize| photons[level][emitter.index()] * pairs[level];
         let whole: f64 = (0..LEVELS).map(light).sum();
         let mut below = 0.0;
@@ -260,7 +260,7 @@ mod tests {
             Emission::from_hard_spheres(atmosphere(), ARC, &radii)
         };
         let (measured, spheres) = (Emission::new(atmosphere(), ARC), of_radius(Auto::Auto));
-        let peak_km = |table: &Emission, energy_ev: f64, emitter: Emitter| {
+        let peak_km = |table: &Emission, energy_ev: f64, emitter: SpectralEmitter| {
             let profile = table.profile(energy_ev);
             let light = |level: &usize| profile[*level][emitter.index()];
             level_altitude_km((0..LEVELS).max_by(|a, b| light(a).total_cmp(&light(b))).unwrap_or(0))
@@ -268,9 +268,9 @@ mod tests {
         // (2.25) with the one radius of the thesis moves green light up by some km; with that of a molecule it leaves none below 190 km. Electrons of
         // 1 keV come far too low, as violet light shows.
         let molecules = of_radius(Auto::Set(185.0));
-        let green = [&measured, &spheres, &molecules].map(|table| peak_km(table, 5000.0, Emitter::OxygenGreen));
+        let green = [&measured, &spheres, &molecules].map(|table| peak_km(table, 5000.0, SpectralEmitter::OxygenGreen));
         assert!(green[0] < 115.0 && (110.0..125.0).contains(&green[1]) && green[2] > 180.0, "{green:?}");
-        let violet = [&measured, &spheres].map(|table| peak_km(table, 1000.0, Emitter::NitrogenIon));
+        let violet = [&measured, &spheres].map(|table| peak_km(table, 1000.0, SpectralEmitter::NitrogenIon));
         assert!(violet[0] > 148.0 && violet[1] < 140.0, "{violet:?}");
         let column = spheres.column(5000.0);
         assert!(column.kilorayleigh.iter().chain(&column.lifetime).all(|value| *value > 0.0 && value.is_finite()));

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_many_falls_is_the_profile() {
+    fn the_mean_of_many_tracks_is_the_profile() {
         let (deposition, sampler) = sampler(0.02);
         let key = Key::new(3, "aurora");
         // Shot noise of 200,000 and 2,000,000 collisions over the 200 and 60 levels that matter: 2.5 and 0.4 %.

@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_that_of_the_falls_that_are_drawn_at_every_energy() {
+    fn it_is_that_of_the_tracks_that_are_drawn_at_every_energy() {
         let key = Key::new(4, "aurora");
         for model in [TrackModel::Fang2010, TrackModel::HardSphereAtmosphere] {
             let emission = model.emission(ARC);

@@ -60,13 +60,13 @@ mod tests {
     };
 
     #[test]
-    fn the_mean_is_the_profile_and_falls_go_down() {
+    fn the_mean_is_the_profile_and_tracks_go_down() {
         let deposition = Deposition::from_hard_spheres(atmosphere(), ARC, DEFAULT_RADIUS_M);
-        let (spheres, heights) =
+        let (spheres, sampler) =
             (HardSphereAtmosphere::new(atmosphere(), DEFAULT_RADIUS_M, 0.0), TrackSampler::new(&deposition, 0.0));
         // The last energy is so great that some of its collisions lie below all levels.
         for node in [10, 32, 64, 96] {
-            let tracks = QuantileMatchedTracks::new(&spheres, &heights, node, Key::new(6, "aurora"));
+            let tracks = QuantileMatchedTracks::new(&spheres, &sampler, node, Key::new(6, "aurora"));
             let mut counts = [0.0; LEVELS];
             for variant in 0..TRACKS_PER_ENERGY {
                 let track = tracks.track(variant);

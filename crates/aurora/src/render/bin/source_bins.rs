@@ -31,8 +31,9 @@ const STEP_KM: f64 = 1.0;
 /// sheets near the magnetic zenith.
 const BINS_PER_REACH: f64 = 5.0;
 const ROWS_PER_BIN: [f64; 2] = [0.5, 1.25];
-/// Sources farther than this are below the horizon, km.
+/// Sources farther than this are below the horizon of an observer below the light, or of one above it at up to 500 km, km.
 const MAX_DISTANCE_KM: f64 = 3000.0;
+const MAX_DISTANCE_FROM_ABOVE_KM: f64 = 4000.0;
 /// Minimum kernel support in cells, so that the sum does not depend on the subcell position.
 const MIN_REACH_CELLS: f32 = 1.6;
 /// Maximum entry spacing of prefiltered emission tables, relative to the altitude step between bins. Steps as large as
@@ -131,20 +132,34 @@ pub(crate) struct DistanceBins {
     far_offset: f64,
     /// Number of bins.
     pub(crate) count: usize,
+    /// Distance at which they end, km.
+    max_distance_km: f64,
 }
 
 impl DistanceBins {
     /// Bins for patches of a standard deviation in km or more, on a chart with rows of `step` radians.
-    pub(super) fn new(spread_km: f64, step: f64) -> Self {
-        let row = step * SCALE_KM;
+    pub(super) fn new(spread_km: f64, step: f64, field: &FieldLines) -> Self {
+        let [nearest_km, farthest_km] = field.border_distances_km(SCALE_KM);
+        let max_distance_km = if field.is_above_light() { MAX_DISTANCE_FROM_ABOVE_KM } else { MAX_DISTANCE_KM };
+        let row = step * nearest_km;
         let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(ROWS_PER_BIN[0] * row, ROWS_PER_BIN[1] * row);
-        let relative_width = (STEP_KM / SCALE_KM).max(2.0 * step);
-        let near_limit_km = (width / relative_width).min(MAX_DISTANCE_KM);
+        let relative_width = (STEP_KM / farthest_km).max(2.0 * step);
+        let near_limit_km = (width / relative_width).min(max_distance_km);
         let near = near_limit_km / width;
-        let count = (near + math::ln(MAX_DISTANCE_KM / near_limit_km) / relative_width).ceil().max(1.0) as usize;
+        let count = (near + math::ln(max_distance_km / near_limit_km) / relative_width).ceil().max(1.0) as usize;
         let per_octave = LN_2 / relative_width;
         let far_offset = near - per_octave * math::log2(near_limit_km);
-        Self { width, per_width: 1.0 / width, near_limit_km, near, relative_width, per_octave, far_offset, count }
+        Self {
+            width,
+            per_width: 1.0 / width,
+            near_limit_km,
+            near,
+            relative_width,
+            per_octave,
+            far_offset,
+            count,
+            max_distance_km,
+        }
     }
 
     /// Width of a bin at a distance, km.
@@ -210,7 +225,7 @@ impl<'a> SortedSources<'a> {
         spread_km: f64,
     ) -> Self {
         let (projection, level) = (chart.projection(), bansho_base::math::simd::level());
-        let bins = DistanceBins::new(spread_km, chart.row_step);
+        let bins = DistanceBins::new(spread_km, chart.row_step, field);
         let shown = VisibleRowTest::new(chart, field);
         let sorted = |(task, sources): (usize, &[FieldLineSource])| {
             let mut spans = vec![ColumnSpan::default(); sources.len()];
@@ -315,19 +330,19 @@ fn find_column_spans(
             + bins.min_reach(distance)
             + bins.smoothing_km(distance);
         if shown.may_contain(source.across, distance, margin_km) {
-            *span = ColumnSpan::covering(source, chart, projection);
+            *span = ColumnSpan::covering(source, chart, projection, bins.max_distance_km as f32);
         }
     }
 }
 
 impl ColumnSpan {
     #[inline(always)]
-    fn covering(source: &FieldLineSource, chart: &Chart, projection: &ChartProjection) -> Self {
+    fn covering(source: &FieldLineSource, chart: &Chart, projection: &ChartProjection, max_distance_km: f32) -> Self {
         let step = chart.column_step as f32;
         let [x, y] = source.across;
         let distance = x.fma(x, y * y).sqrt();
         let reach = source.reach.max(MIN_REACH_CELLS * step * distance);
-        if source.power == [0.0; 3] || distance > MAX_DISTANCE_KM as f32 {
+        if source.power == [0.0; 3] || distance > max_distance_km {
             return Self::default();
         }
         if reach * 1.001 >= distance {

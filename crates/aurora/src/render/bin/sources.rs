@@ -11,7 +11,7 @@ use super::source_bins::{FieldLineSource, REACH};
 use crate::{
     physics::{
         attenuation_by_distance::AttenuationByDistance,
-        emission::{Emission, Emitter, red_line_altitudes::RED_ALTITUDES},
+        emission::{Emission, SpectralEmitter, red_line_altitudes::RED_ALTITUDES},
         precipitation::energy_grid::{LOWEST_EV, NODES, node_coordinate, node_energy_ev},
     },
     render::{
@@ -203,12 +203,14 @@ impl Sources {
         let min_power = if by_collisions { MIN_RELATIVE_POWER_WITH_COLLISIONS } else { MIN_RELATIVE_POWER };
         let column = inputs.emission.column(inputs.energy_ev);
         let spread = math::hypot(inputs.spread_km(), times.smear_km);
-        let with = |emitter: Emitter, cell_km: f64| {
+        let with = |emitter: SpectralEmitter, cell_km: f64| {
             let diffusion = column.spread_km[emitter.index()];
             math::sqrt(spread * spread + diffusion * diffusion + cell_km * cell_km / 6.0)
         };
-        let cell_spreads =
-            [with(Emitter::OxygenGreen, afterglow.green.cell_km()), with(Emitter::OxygenRed, afterglow.red.cell_km())];
+        let cell_spreads = [
+            with(SpectralEmitter::OxygenGreen, afterglow.green.cell_km()),
+            with(SpectralEmitter::OxygenRed, afterglow.red.cell_km()),
+        ];
         let blocks = [afterglow.green.block(cell_spreads[0]), afterglow.red.block(cell_spreads[1])];
         let ((green_w, green), red) = parallel::join(
             || afterglow.green.distribute_to_particles(inputs.particles, min_power, blocks[0]),

@@ -15,14 +15,14 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, dispatch, prelude::*};
 
-use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_LEVELS};
+use super::emission_profile::{BOTTOM_KM, EmissionProfile, EmissionProfiles, MIP_LEVELS, ProfilesAroundObserver};
 use crate::{
     physics::emission::PerEmitter,
     render::{
         bin::source_bins::{Bin, BlockBins, DistanceBins, MAX_ENTRY_PER_STEP, SortedSources},
         project::{
             chart::{BLOCK_COLUMNS, Chart},
-            field_lines::{FieldLine, FieldLines, Meridian, altitude},
+            field_lines::{EarthShadow, FieldLine, FieldLines, Meridian, altitude},
         },
     },
 };
@@ -58,6 +58,8 @@ struct ProfilePass<'a> {
     chart: &'a Chart,
     field: &'a FieldLines,
     profiles: &'a EmissionProfiles,
+    /// For an observer who may be within the light.
+    around_observer: Option<ProfilesAroundObserver<'a>>,
     bins: &'a DistanceBins,
     /// Center and width of every bin, km.
     distances: &'a [[f64; 2]],
@@ -65,6 +67,8 @@ struct ProfilePass<'a> {
     cotangents: &'a [f32],
     knots: &'a [f32],
     inverse_sines: &'a [f32],
+    /// Largest height difference between the observer and [`SLOW_KM`], km.
+    slow_height_km: f32,
 }
 
 impl ColumnBuffer {
@@ -85,11 +89,15 @@ impl ColumnBuffer {
             chart,
             field,
             profiles,
+            around_observer: field
+                .is_above_light()
+                .then(|| ProfilesAroundObserver::new(profiles, field.observer_altitude_km())),
             bins: sorted_sources.bins(),
             distances: &distances,
             cotangents: &cotangents,
             knots: &knots,
             inverse_sines: &inverse_sines,
+            slow_height_km: field.border_distances_km(f64::from(SLOW_KM))[1] as f32,
         };
         let scratch_pool = ScratchPool::new(ProfileScratch::default);
         blocks.with_max_len(1).for_each(|block| {
@@ -295,7 +303,19 @@ impl ProfilePass<'_> {
         // The bin's power already includes its width; the rest is per km along the line of sight.
         let weights = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
         let (distance, width) = (distance as f32, width as f32);
-        let bin_rows = BinRows { line: &line, profile: &profile, distance, width, near, weights };
+        let shadow = self.field.is_above_light().then(|| meridian.earth_shadow());
+        let sides = self.around_observer.as_ref().filter(|_| near).map(|profiles| profiles.at(by_node / all));
+        let bin_rows = BinRows {
+            line: &line,
+            profile: &profile,
+            sides,
+            observer_altitude: self.field.observer_altitude_km() as f32 - BOTTOM_KM,
+            distance,
+            width,
+            near,
+            weights,
+            shadow,
+        };
         let light = block.extend_valid_rows(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
         let rest = if near { first } else { self.add_knot_rows(&bin_rows, first..end, slow) };
         self.add_dense_rows(&bin_rows, rest, &mut light[rest.min(end)..end]);
@@ -312,7 +332,8 @@ impl ProfilePass<'_> {
     fn add_knot_rows<S: Simd>(&self, bin_rows: &BinRows<S>, rows: Range<usize>, slow: &mut KnotBuffer) -> usize {
         let distance = bin_rows.distance;
         // Altitude difference between knots.
-        let knot_km = (KNOT_ROWS as f32 * self.chart.row_step as f32) * (SLOW_KM * SLOW_KM / distance + distance);
+        let knot_km = (KNOT_ROWS as f32 * self.chart.row_step as f32)
+            * (self.slow_height_km * self.slow_height_km / distance + distance);
         let end = self.row_of_altitude(
             bin_rows.line,
             f64::from(distance),
@@ -362,11 +383,17 @@ impl ProfilePass<'_> {
 struct BinRows<'a, S: Simd> {
     line: &'a FieldLine,
     profile: &'a EmissionProfile<'a>,
+    /// What is above and below an observer who may be within the light, for near bins.
+    sides: Option<[EmissionProfile<'a>; 2]>,
+    /// Altitude of the observer above the lowest level, km.
+    observer_altitude: f32,
     distance: f32,
     width: f32,
     /// Whether it is a near bin.
     near: bool,
     weights: FourLanes<S>,
+    /// What the Earth hides, for an observer above the light.
+    shadow: Option<EarthShadow>,
 }
 
 impl<S: Simd> BinRows<'_, S> {
@@ -378,17 +405,36 @@ impl<S: Simd> BinRows<'_, S> {
             let position = self.distance * cotangents[i];
             altitudes[i] = altitude(position.fma(position + linear, constant)) - BOTTOM_KM;
         }
+        if let Some(shadow) = &self.shadow {
+            for i in 0..ROWS {
+                // Below all tables, where nothing shines.
+                altitudes[i] = if shadow.hides(self.distance, cotangents[i]) { -1e6 } else { altitudes[i] };
+            }
+        }
         // Altitude change from bin to bin in the steepest row; for far bins it is proportional to the bin width, as the
         // profile is.
         if !self.near || self.width * cotangents[0].abs().max(cotangents[light.len() - 1].abs()) < STEP_KM {
-            self.add_rows(self.profile.table(0), &altitudes, light);
+            // Without a filter nothing is spread beyond the observer's own field line, and what is there is behind the observer.
+            if self.sides.is_none() || self.distance > 0.0 {
+                self.add_rows(self.profile.table(0), &altitudes, light);
+            }
             return;
         }
         let mip_levels = self.mip_levels(cotangents);
         for i in 0..light.len() {
+            let profile = self.profile_in_front(altitudes[i]);
             let altitude = altitudes[i].fma(approximations::exp2(-mip_levels[i]), 1.0);
-            self.add_row(self.profile.table(mip_levels[i] as usize), altitude, &mut light[i]);
+            self.add_row(profile.table(mip_levels[i] as usize), altitude, &mut light[i]);
         }
+    }
+
+    /// The profile without what is behind the observer, for a line of sight that passes this bin at an altitude above the lowest level, km. In front
+    /// of the observer it stays on one side of the observer's altitude; bins beyond the observer's own field line are behind.
+    #[inline(always)]
+    fn profile_in_front(&self, altitude: f32) -> &EmissionProfile<'_> {
+        let Some([above, below]) = &self.sides else { return self.profile };
+        let is_higher = altitude > self.observer_altitude;
+        if is_higher == (self.distance > 0.0) { above } else { below }
     }
 
     /// Mip level per row: coarser where the altitude changes more from bin to bin.

@@ -9,7 +9,7 @@ use crate::{
     physics::{
         atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
         emission::{
-            EMITTERS, Emission, Emitter, PHOTONS_PER_KILORAYLEIGH, PerEmitter,
+            EMITTERS, Emission, PHOTONS_PER_KILORAYLEIGH, PerEmitter, SpectralEmitter,
             red_line_altitudes::{RED_ALTITUDES, red_by_altitude},
         },
         precipitation::energy_grid::NODES,
@@ -86,9 +86,7 @@ impl EmissionProfiles {
     /// The profile of an energy, given as fractional node index; `red` includes the red line's altitude range.
     #[inline(always)]
     pub(super) fn at(&self, node: f32, red: bool) -> EmissionProfile<'_> {
-        let last = self.tables.len() - 1;
-        let table_index = ((node * TABLES_PER_NODE as f32 + 0.5).max(0.0) as usize).min(last);
-        let MipTables { values, tops_km: [prompt_km, red_km], bottom_km } = self.table(table_index);
+        let MipTables { values, tops_km: [prompt_km, red_km], bottom_km } = self.table(table_index(node));
         EmissionProfile { values, bottom_km: *bottom_km, top_km: if red { red_km.max(*prompt_km) } else { *prompt_km } }
     }
 
@@ -108,13 +106,56 @@ impl EmissionProfiles {
     }
 }
 
+/// Index of the table for an energy, given as fractional node index.
+#[inline(always)]
+fn table_index(node: f32) -> usize {
+    ((node * TABLES_PER_NODE as f32 + 0.5).max(0.0) as usize).min((NODES - 1) * TABLES_PER_NODE)
+}
+
+/// Emission above and below an observer within the light, each without the other. A line of sight nearly along the field looks through only one of
+/// them, while a table of the whole profile, filtered over many kilometers, mixes both.
+pub(super) struct ProfilesAroundObserver<'a> {
+    profiles: &'a EmissionProfiles,
+    altitude_km: f64,
+    tables: Vec<OnceLock<[Vec<PerEmitter<f32>>; 2]>>,
+}
+
+impl<'a> ProfilesAroundObserver<'a> {
+    /// For an observer at an altitude, km.
+    pub(super) fn new(profiles: &'a EmissionProfiles, altitude_km: f64) -> Self {
+        Self { profiles, altitude_km, tables: vec![OnceLock::new(); profiles.tables.len()] }
+    }
+
+    /// The profiles above and below the observer of an energy, given as fractional node index.
+    #[inline(never)]
+    pub(super) fn at(&self, node: f32) -> [EmissionProfile<'_>; 2] {
+        let index = table_index(node);
+        let MipTables { values, tops_km: [prompt_km, red_km], bottom_km } = self.profiles.table(index);
+        let sides = self.tables[index].get_or_init(|| [true, false].map(|is_above| self.side(values, is_above)));
+        let (bottom_km, top_km) = (*bottom_km, red_km.max(*prompt_km));
+        sides.each_ref().map(|values| EmissionProfile { values, bottom_km, top_km })
+    }
+
+    /// The mip levels of the part of a profile above or below the observer. A level of the atmosphere stands for half a kilometer on both sides of its
+    /// altitude.
+    fn side(&self, values: &[PerEmitter<f32>], is_above: bool) -> Vec<PerEmitter<f32>> {
+        let part = |entry: usize| {
+            let above = (f64::from(BOTTOM_KM) + entry as f64 - 1.0 - self.altitude_km + 0.5).clamp(0.0, 1.0);
+            if is_above { above } else { 1.0 - above }
+        };
+        let entries = values[..STARTS[1]].iter().enumerate();
+        mip_levels(entries.map(|(entry, light)| light.map(|value| f64::from(value) * part(entry))).collect())
+    }
+}
+
 impl MipTables {
     /// From the volume emission at each level.
     fn new(profile: &[PerEmitter<f64>]) -> Self {
         Self {
             values: smoothed(profile),
-            tops_km: [Emitter::OxygenGreen, Emitter::OxygenRed].map(|emitter| top_km(profile, emitter.index())),
-            bottom_km: bottom_km(profile, &EMITTERS.map(Emitter::index)),
+            tops_km: [SpectralEmitter::OxygenGreen, SpectralEmitter::OxygenRed]
+                .map(|emitter| top_km(profile, emitter.index())),
+            bottom_km: bottom_km(profile, &EMITTERS.map(SpectralEmitter::index)),
         }
     }
 
@@ -128,9 +169,13 @@ impl MipTables {
 
 /// All mip levels, from the volume emission at each level.
 fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
-    let mut light = Vec::with_capacity(STARTS[MIP_LEVELS]);
     let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
-    let mut table: Vec<PerEmitter<f64>> = std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect();
+    mip_levels(std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect())
+}
+
+/// All mip levels of a table, concatenated.
+fn mip_levels(mut table: Vec<PerEmitter<f64>>) -> Vec<PerEmitter<f32>> {
+    let mut light = Vec::with_capacity(STARTS[MIP_LEVELS]);
     for mip_level in 0..MIP_LEVELS {
         let entry = |at: usize| table.get(at).copied().unwrap_or_default();
         light.extend((0..entries(mip_level)).map(|at| entry(at).map(|value| value as f32)));

@@ -19,7 +19,7 @@ const MAX_SIZE: f64 = 16_384.0;
 /// Maximum chart cells per pixel: more occur only where a camera zooms or pans far during the exposure, which blurs
 /// them.
 const MAX_CELLS_PER_PIXEL: f64 = 16.0;
-/// Minimum sine of the elevation that is drawn.
+/// Minimum sine of the elevation that is drawn for observers below the light.
 const MIN_SINE_ELEVATION: f64 = -0.35;
 
 /// Angular range of a chart, radians.
@@ -31,6 +31,8 @@ pub(crate) struct Coverage {
     colatitude: [f64; 2],
     /// Angle of a pixel, or more where the chart would have too many cells.
     pub(crate) pixel: f64,
+    /// Whether the rows end at the direction opposite to the magnetic zenith, so that they must be symmetric to it.
+    ends_at_nadir: bool,
 }
 
 /// A grid of directions; columns are meridians, rows parallels.
@@ -68,15 +70,18 @@ impl Coverage {
         let camera = &view.camera;
         let pixel = 1.0 / camera.focal_pixels;
         let margin = 1.5 * camera.size[0].max(camera.size[1]) / (SAMPLES_PER_SIDE - 1) as f64 * pixel;
-        let full_circle = min_colatitude < margin || reach > 0.8 * PI;
+        let sees_nadir = field.is_above_light() && max_colatitude > PI - margin;
+        let sees_zenith = min_colatitude < margin || (reach > 0.8 * PI && !sees_nadir);
+        let full_circle = sees_zenith || sees_nadir || reach > 0.8 * PI;
         let sine = math::sin(min_colatitude.min(FRAC_PI_2)).max(1e-3);
         let mut coverage = Self {
             longitude: [middle, if full_circle { PI } else { (reach + margin / sine).min(PI) }],
             colatitude: [
-                if full_circle { 0.0 } else { min_colatitude - margin }.max(0.0),
+                if sees_zenith { 0.0 } else { min_colatitude - margin }.max(0.0),
                 (max_colatitude + margin).min(PI),
             ],
             pixel,
+            ends_at_nadir: sees_nadir,
         };
         let max_cells = MAX_CELLS_PER_PIXEL * camera.size[0] * camera.size[1];
         coverage.pixel = pixel.max(math::sqrt(coverage.area() / max_cells));
@@ -108,7 +113,7 @@ fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<It
             fraction(index / SAMPLES_PER_SIDE) * camera.size[1],
         );
         let direction = camera.direction(pixel)?.normalize();
-        (direction.y > MIN_SINE_ELEVATION)
+        (direction.y > MIN_SINE_ELEVATION || field.is_above_light())
             .then(|| [field.along, field.across[0], field.across[1]].map(|axis| direction.dot(axis)))
     })
 }
@@ -126,8 +131,11 @@ impl Chart {
         // Aligned to multiples of the step, so that the chart does not crawl as the camera turns.
         let first_longitude = if wraps { -PI } else { ((middle - reach) / column_step).floor() * column_step };
         let row = row.max((max_colatitude - min_colatitude) / MAX_SIZE);
+        // No row may reach beyond the nadir, where its sine would be negative.
+        let row = if coverage.ends_at_nadir { PI / (PI / row).floor().max(1.0) } else { row };
         let first_row = (min_colatitude / row).floor();
-        let rows = ((max_colatitude / row).ceil() - first_row).max(2.0) as usize;
+        let last_row = if coverage.ends_at_nadir { (PI / row).round() } else { (max_colatitude / row).ceil() };
+        let rows = (last_row - first_row).max(2.0) as usize;
         Self { columns, rows, column_step, row_step: row, first_longitude, first_colatitude: first_row * row, wraps }
     }
 

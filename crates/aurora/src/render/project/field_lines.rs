@@ -6,7 +6,11 @@
 use bansho_base::math::{self, DVec2, DVec3, MulAdd, approximations};
 pub(crate) use bansho_base::world::sky::EARTH_RADIUS_KM;
 
+use crate::physics::atmosphere::LOWEST_KM;
 pub(crate) use crate::shapes::FOOT_ALTITUDE_KM;
+
+/// Altitude of the observer from which on it counts, km: below it, scales are those of an observer on the ground.
+const ELEVATED_KM: f64 = 20.0;
 /// Minimum dip angle, degrees: nearer the magnetic equator there are no auroras and field lines would not reach the
 /// ground.
 const MIN_DIP_DEG: f64 = 30.0;
@@ -71,10 +75,14 @@ impl FieldLines {
         let direction = direction.normalize();
         let nearest = -self.observer.dot(direction);
         let squared = nearest * nearest + SHELL * SHELL - self.observer.length_squared();
-        let position = self.observer + direction * (nearest + math::sqrt(squared.max(0.0)));
+        let half_chord = math::sqrt(squared.max(0.0));
+        // From within the plane's shell a line of sight passes it once; from above, it is seen where the line enters the shell.
+        let is_above = self.observer.length_squared() > SHELL * SHELL;
+        let along = if is_above { nearest - half_chord } else { nearest + half_chord };
+        let position = self.observer + direction * along;
         let level = DVec2::new(position.x, position.z);
         let distance = SHELL * math::atan2(level.length(), position.y);
-        (squared >= 0.0).then(|| level.normalize_or_zero() * distance)
+        (squared >= 0.0 && along >= 0.0).then(|| level.normalize_or_zero() * distance)
     }
 
     /// The lines through the half-plane of a longitude, given by its cosine and sine.
@@ -103,6 +111,38 @@ impl FieldLines {
     pub(crate) fn observer_altitude_km(&self) -> f64 {
         self.observer.length() - EARTH_RADIUS_KM
     }
+
+    /// Whether light may be below the observer, in front of the Earth: only from the altitude of the lowest light on.
+    pub(crate) fn is_above_light(&self) -> bool {
+        self.observer_altitude_km() >= LOWEST_KM
+    }
+
+    /// Sine of the elevation of the Earth's horizon.
+    pub(crate) fn horizon_sine(&self) -> f64 {
+        let altitude_km = self.observer_altitude_km().max(0.0);
+        if !self.is_elevated() {
+            // The dip is small.
+            return -math::sqrt(2.0 * altitude_km / EARTH_RADIUS_KM);
+        }
+        let cosine = EARTH_RADIUS_KM / (EARTH_RADIUS_KM + altitude_km);
+        -math::sqrt(1.0 - cosine * cosine)
+    }
+
+    /// Whether the observer is so high that light may be near, or both above and below.
+    pub(crate) fn is_elevated(&self) -> bool {
+        self.observer_altitude_km() >= ELEVATED_KM
+    }
+
+    /// Height difference between the observer and the lower border of light, the sharpest feature, km: at least, and at most, what bins are made
+    /// for. `ground` is that difference for an observer on the ground.
+    pub(crate) fn border_distances_km(&self, ground: f64) -> [f64; 2] {
+        const MIN_KM: f64 = 10.0;
+        if !self.is_elevated() {
+            return [ground; 2];
+        }
+        let distance = (ground - self.observer_altitude_km()).abs();
+        [distance.clamp(MIN_KM, ground), distance.max(ground)]
+    }
 }
 
 /// All field lines of one longitude.
@@ -127,6 +167,11 @@ impl Meridian {
         FieldLine { excess: self.squared + distance * (2.0 * self.outward + distance), along: self.along }
     }
 
+    /// What the Earth hides of its lines.
+    pub(crate) fn earth_shadow(&self) -> EarthShadow {
+        self.coefficients_f32().into()
+    }
+
     /// In single precision: squared distance of the observer from the Earth's center minus the squared Earth radius,
     /// and its components outward and along the field.
     #[inline(always)]
@@ -146,6 +191,44 @@ impl FieldLine {
     /// s))`.
     pub(crate) fn quadratic(&self) -> [f32; 2] {
         [self.excess as f32, (2.0 * self.along) as f32]
+    }
+}
+
+/// The part of a half-plane of field lines that is behind the Earth for an observer above the light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EarthShadow {
+    /// As of [`Meridian`], km.
+    squared: f32,
+    outward: f32,
+    along: f32,
+}
+
+impl EarthShadow {
+    /// Whether the Earth hides the point at a distance in km from the observer's own field line that is seen at a colatitude with this cotangent.
+    ///
+    /// With the direction d of the line of sight, the observer O and the point P: the line meets the Earth if O . d < 0 and (O . d)^2 > O^2 - R^2;
+    /// what lies beyond its deepest point, P . d > 0, is then hidden. All products are divided by the sine of the colatitude.
+    #[inline(always)]
+    pub(crate) fn hides(&self, distance: f32, cotangent: f32) -> bool {
+        let toward = cotangent.fma(self.along, self.outward);
+        let length_squared = cotangent.fma(cotangent, 1.0);
+        toward < 0.0 && toward * toward > self.squared * length_squared && distance.fma(length_squared, toward) > 0.0
+    }
+
+    /// Whether it hides the point at an altitude on the field line at a distance, km.
+    pub(crate) fn hides_altitude(&self, distance: f32, altitude_km: f32) -> bool {
+        const DIAMETER: f32 = 2.0 * EARTH_RADIUS_KM as f32;
+        let excess = distance.fma(2.0 * self.outward + distance, self.squared);
+        let squared = self.along.fma(self.along, altitude_km.fma(DIAMETER + altitude_km, -excess));
+        let position = squared.max(0.0).sqrt() - self.along;
+        distance > 0.0 && self.hides(distance, position / distance)
+    }
+}
+
+impl From<[f32; 3]> for EarthShadow {
+    /// From [`Meridian::coefficients_f32`].
+    fn from([squared, outward, along]: [f32; 3]) -> Self {
+        Self { squared, outward, along }
     }
 }
 

@@ -55,12 +55,14 @@ impl VisibleRowTest {
         let change = margin_km * 2.0_f32.fma(distance + self.lean, margin_km);
         let highest = self.position_at_altitude(HIGHEST_KM as f32, excess - change);
         let lowest = self.position_at_altitude(LOWEST_KM as f32, excess + change);
-        // Sine of the angle by which its lowest light at the margin's outer edge is below the first row; likewise for
-        // the last row.
+        // Sine of the angle by which its lowest light is below the first row, at the edge of the margin where its colatitude is largest: the outer
+        // edge if it is above the observer, else the inner one, which may lie on the observer's own line. Likewise for the last row.
         let [sine, cosine] = self.first;
-        let above = (distance + margin_km).fma(cosine, -lowest * sine) < 0.0;
+        let edge = if lowest > 0.0 { distance + margin_km } else { distance - margin_km };
+        let above = edge > 0.0 && edge.fma(cosine, -lowest * sine) < 0.0;
         let [sine, cosine] = self.last;
-        let below = distance > margin_km && (distance - margin_km).fma(cosine, -highest * sine) > 0.0;
+        let edge = if highest > 0.0 { distance - margin_km } else { distance + margin_km };
+        let below = edge > 0.0 && edge.fma(cosine, -highest * sine) > 0.0;
         !above && !below
     }
 
@@ -99,9 +101,22 @@ mod tests {
 
     #[test]
     fn lines_are_left_out_only_where_they_are_not_seen() {
-        for (dip_deg, target) in [(77.0, [0.0, 25.0, -60.0]), (60.0, [0.0, 60.0, 60.0]), (90.0, [40.0, 5.0, -10.0])] {
-            let field = FieldLines::new(dip_deg, 0.0, DVec3::new(2e3, 1.7, -5e3));
-            let camera = CameraParameters { target: target.into(), ..CameraParameters::default() };
+        let views = [
+            (77.0, 0.0, [0.0, 25.0, -60.0]),
+            (60.0, 0.0, [0.0, 60.0, 60.0]),
+            (90.0, 0.0, [40.0, 5.0, -10.0]),
+            (77.0, 60.0, [0.0, 70.0, -60.0]),
+            (77.0, 200.0, [0.0, 100.0, -60.0]),
+            (60.0, 400.0, [40.0, 100.0, -400.0]),
+        ];
+        for (dip_deg, altitude_km, target) in views {
+            let position = DVec3::new(2e3, 1.7 + 1e3 * altitude_km, -5e3);
+            let field = FieldLines::new(dip_deg, 0.0, position);
+            let camera = CameraParameters {
+                position: position.to_array().into(),
+                target: target.map(|km| 1e3 * km).into(),
+                ..CameraParameters::default()
+            };
             let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [128, 72], 0);
             let coverage = Coverage::of_view(&view, &field);
             let chart = Chart::new(&coverage, coverage.pixel, coverage.pixel);
@@ -113,12 +128,15 @@ mod tests {
                     let distance = math::hypot(f64::from(across[0]), f64::from(across[1])) as f32;
                     let (is_seen, is_kept) =
                         (is_seen(&chart, &field, across), shown.may_contain(across, distance, 3.0));
-                    assert!(is_kept || !is_seen, "dip {dip_deg}: {across:?}");
+                    assert!(is_kept || !is_seen, "dip {dip_deg} from {altitude_km} km: {across:?}");
                     (seen, kept, all) = (seen + usize::from(is_seen), kept + usize::from(is_kept), all + 1);
                 }
             }
             // Few too many.
-            assert!(kept < seen + all / 20 && seen < all, "dip {dip_deg}: {seen} seen, {kept} kept of {all}");
+            assert!(
+                kept < seen + all / 20 && seen < all,
+                "dip {dip_deg} from {altitude_km} km: {seen} seen, {kept} kept of {all}"
+            );
         }
     }
 }

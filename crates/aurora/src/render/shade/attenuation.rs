@@ -10,7 +10,7 @@ use fearless_simd::{Simd, prelude::*};
 
 use crate::{
     physics::{
-        emission::{ColorMatching, EMITTERS, Emitter, LineSet, PerEmitter},
+        emission::{ColorMatching, EMITTERS, LineSet, PerEmitter, SpectralEmitter},
         extinction::Extinction,
     },
     render::RenderingParameters,
@@ -39,7 +39,7 @@ impl EmitterColors {
             EMITTERS.map(|emitter| {
                 let [red, green, blue] =
                     attenuated_color(emitter, lines, *color_matching, air, elevation).map(|value| value as f32);
-                [red, green, blue, if emitter == Emitter::Nitrogen { 0.0 } else { 1.0 }]
+                [red, green, blue, if emitter == SpectralEmitter::Nitrogen { 0.0 } else { 1.0 }]
             })
         });
         Self { colors: colors.collect() }
@@ -66,13 +66,13 @@ impl EmitterColors {
 
 /// Attenuated color of a kilorayleigh of an emitter, all lines included.
 fn attenuated_color(
-    emitter: Emitter,
+    emitter: SpectralEmitter,
     lines: LineSet,
     color_matching: ColorMatching,
     air: &Extinction,
     elevation: f64,
 ) -> [f64; 3] {
-    if emitter == Emitter::Nitrogen && lines == LineSet::Observed {
+    if emitter == SpectralEmitter::Nitrogen && lines == LineSet::Observed {
         let transmittance = air.transmittance(BANDS_NM, elevation);
         return emitter.color_per_kilorayleigh().map(|value| value * transmittance);
     }
@@ -108,12 +108,12 @@ mod tests {
     #[test]
     fn blue_fades_before_red_toward_the_horizon() {
         let emitter_colors = EmitterColors::new(&RenderingParameters::default(), LineSet::Observed);
-        let transmittance = |emitter: Emitter| {
+        let transmittance = |emitter: SpectralEmitter| {
             let mut light = [0.0; 4];
             light[emitter.index()] = 1.0;
             let blue = |sine: f32| dispatch!(bansho_base::math::simd::level(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(sine))[2]);
             blue(0.02) / blue(1.0)
         };
-        assert!(transmittance(Emitter::NitrogenIon) < 0.5 * transmittance(Emitter::OxygenGreen).abs());
+        assert!(transmittance(SpectralEmitter::NitrogenIon) < 0.5 * transmittance(SpectralEmitter::OxygenGreen).abs());
     }
 }

@@ -14,7 +14,7 @@ use fearless_simd::{Simd, dispatch, prelude::*};
 
 use crate::{
     parameters::BlurParameters,
-    physics::emission::{EMITTERS, Emitter, PerEmitter},
+    physics::emission::{EMITTERS, PerEmitter, SpectralEmitter},
     render::{
         project::{
             field_lines::FieldLines,
@@ -138,12 +138,12 @@ fn sample_row<S: Simd>(
 
 impl BlurParameters {
     /// Standard deviation of an emitter's light, pixels.
-    fn pixels(&self, emitter: Emitter) -> f64 {
+    fn pixels(&self, emitter: SpectralEmitter) -> f64 {
         match emitter {
-            Emitter::OxygenGreen => self.green_px,
-            Emitter::OxygenRed => self.red_px,
-            Emitter::NitrogenIon => self.violet_px,
-            Emitter::Nitrogen => self.deep_red_px,
+            SpectralEmitter::OxygenGreen => self.green_px,
+            SpectralEmitter::OxygenRed => self.red_px,
+            SpectralEmitter::NitrogenIon => self.violet_px,
+            SpectralEmitter::Nitrogen => self.deep_red_px,
         }
     }
 }

@@ -42,7 +42,7 @@ use crate::{
         project::{
             altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials, altitudes_km},
             chart::{BLOCK_COLUMNS, Chart, ChartProjection},
-            field_lines::FieldLines,
+            field_lines::{EarthShadow, FOOT_ALTITUDE_KM, FieldLines},
         },
     },
 };
@@ -133,7 +133,15 @@ impl CollisionRenderer {
     ) -> ColumnBuffer {
         let level = bansho_base::math::simd::level();
         let (chart, blocks) = buffer.blocks(COLLISION_BLOCK_COLUMNS);
-        let pass = CollisionPass { collisions: self, chart, projection: chart.projection(), sorted_sources, step };
+        let pass = CollisionPass {
+            collisions: self,
+            chart,
+            projection: chart.projection(),
+            sorted_sources,
+            step,
+            is_elevated: field.is_elevated(),
+            is_above_light: field.is_above_light(),
+        };
         // Largest block first (LPT scheduling), for load balance.
         let mut blocks: Vec<_> = blocks.map(|block| (sorted_sources.count(block.number), block)).collect();
         blocks.sort_by_key(|(count, _)| *count);
@@ -245,6 +253,10 @@ struct CollisionPass<'a> {
     projection: ChartProjection,
     sorted_sources: &'a SortedSources<'a>,
     step: u32,
+    /// Whether the observer is so high that the polynomials, which are made for observers on the ground, do not hold.
+    is_elevated: bool,
+    /// Whether the Earth may hide light.
+    is_above_light: bool,
 }
 
 impl CollisionPass<'_> {
@@ -314,9 +326,13 @@ impl CollisionPass<'_> {
         let CollisionScratch { block, rasterizer, points } = scratch;
         rasterizer.reset();
         let (meridian, distance) = block.meridian_and_distance(column, &track.source);
+        // A line is hidden as a whole, by its lower border: between the first and the last of its light are less than 100 km beyond the limb.
+        if self.is_above_light && EarthShadow::from(*meridian).hides_altitude(distance, FOOT_ALTITUDE_KM as f32) {
+            return;
+        }
         let line = ProjectedFieldLine::new(meridian, distance, &self.projection);
         let reach = track.source.reach.max(self.sorted_sources.bins().min_reach(distance));
-        if distance < EXACT_REACHES * reach {
+        if distance < EXACT_REACHES * reach || self.is_elevated {
             self.add(simd, track, reach, 0.0, &LineProjection::Exact(line), rasterizer, points);
             return;
         }

@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_collision_of_a_fall_is_in_a_batch() {
+    fn every_collision_of_a_track_is_in_a_batch() {
         for (collisions, count) in [(1, 1), (16, 1), (17, 2), (50, 4), (100, 7), (20, 4)] {
             let collision = |number: usize| {
                 let altitude_km = 300.0 - 2.0 * number as f32;

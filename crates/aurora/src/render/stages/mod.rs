@@ -18,7 +18,7 @@ pub(crate) use canvas::WHITE_LUMINANCE;
 use canvas::{Canvas, color, false_color};
 
 use crate::{
-    Aurora, Stage,
+    Aurora, AuroraStage,
     shapes::Shape,
     simulate::{AuroraSimulation, field::Grid2},
 };
@@ -44,7 +44,7 @@ pub(crate) struct PreparedStage {
 
 impl PreparedStage {
     /// The stage of an aurora in a view.
-    pub(crate) fn new(aurora: &Aurora, stage: Stage, view: &View) -> Self {
+    pub(crate) fn new(aurora: &Aurora, stage: AuroraStage, view: &View) -> Self {
         let side = view.size[0].min(view.size[1]);
         let simulation = aurora.simulation();
         let shape = aurora.sequence().at(view.shutter.middle());
@@ -54,16 +54,16 @@ impl PreparedStage {
 }
 
 /// The picture of a stage.
-fn draw(simulation: &AuroraSimulation, shape: &Shape, stage: Stage, side: usize) -> Canvas {
+fn draw(simulation: &AuroraSimulation, shape: &Shape, stage: AuroraStage, side: usize) -> Canvas {
     let mut canvas = Canvas::new(side, simulation.parameters().extent_km, color([1.0; 3]));
     match stage {
-        Stage::Light => {}
-        Stage::Shape => draw_shape(&mut canvas, shape),
-        Stage::ScatterCount => draw_counts(&mut canvas, simulation, simulation.scatter_counts()),
-        Stage::ParticleCount => draw_counts(&mut canvas, simulation, &simulation.particle_counts()),
-        Stage::PotentialNoise => draw_noise(&mut canvas, simulation),
-        Stage::Potential => draw_potential(&mut canvas, simulation),
-        Stage::NearCells => draw_near_cells(&mut canvas, simulation),
+        AuroraStage::Light => {}
+        AuroraStage::Shape => draw_shape(&mut canvas, shape),
+        AuroraStage::ScatterCount => draw_counts(&mut canvas, simulation, simulation.scatter_counts()),
+        AuroraStage::ParticleCount => draw_counts(&mut canvas, simulation, &simulation.particle_counts()),
+        AuroraStage::PotentialNoise => draw_noise(&mut canvas, simulation),
+        AuroraStage::Potential => draw_potential(&mut canvas, simulation),
+        AuroraStage::NearCells => draw_near_cells(&mut canvas, simulation),
     }
     canvas
 }

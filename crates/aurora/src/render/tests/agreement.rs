@@ -7,7 +7,7 @@ use crate::{parameters::MAX_COLLISION_DEFLECTION, physics::precipitation::HardSp
 
 /// Sum of absolute differences over the sum, for each emitter but the red line, which is not drawn by collisions.
 fn differences(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> [f64; 3] {
-    [Emitter::OxygenGreen, Emitter::NitrogenIon, Emitter::Nitrogen].map(|emitter| {
+    [SpectralEmitter::OxygenGreen, SpectralEmitter::NitrogenIon, SpectralEmitter::Nitrogen].map(|emitter| {
         let i = emitter.index();
         let apart: f64 = a.iter().zip(b).map(|(a, b)| f64::from((a[i] - b[i]).abs())).sum();
         apart / b.iter().map(|light| f64::from(light[i])).sum::<f64>()
@@ -47,13 +47,13 @@ fn beside_profile(
 
 /// The same for an arc of so many particles with tracks of a seed.
 fn arc_beside_profile(
-    fall: TrackModel,
+    track_model: TrackModel,
     collision_deflection: f64,
     seed: u64,
     particles: usize,
 ) -> ([f64; 3], ColumnBuffer) {
     let drawing =
-        RenderingParameters { energy_deposition: fall, collision_deflection, ..RenderingParameters::default() };
+        RenderingParameters { energy_deposition: track_model, collision_deflection, ..RenderingParameters::default() };
     arc_drawn(&drawing, seed, particles)
 }
 
@@ -90,7 +90,7 @@ fn the_mean_of_many_collision_pictures_is_the_profile() {
 }
 
 #[test]
-fn the_mean_of_many_falls_of_the_thesis_is_their_profile() {
+fn the_mean_of_many_tracks_of_the_thesis_is_their_profile() {
     // A track has a single collision or two above 190 km, where all green light is: more noise, and so more particles.
     for (seed, collision_deflection) in
         [(5, usual_collision_deflection()), (77, usual_collision_deflection()), (5, MAX_COLLISION_DEFLECTION)]
@@ -124,7 +124,7 @@ fn collisions_lose_no_light_on_hard_sheets() {
 }
 
 /// The row of a picture above which half of an emitter's light is, from the magnetic zenith on.
-fn middle_row(picture: &ColumnBuffer, emitter: Emitter) -> usize {
+fn middle_row(picture: &ColumnBuffer, emitter: SpectralEmitter) -> usize {
     let mut rows = vec![0.0; picture.chart.rows];
     for (at, light) in picture.light.iter().enumerate() {
         rows[at % picture.chart.rows] += f64::from(light[emitter.index()]);
@@ -140,7 +140,7 @@ fn middle_row(picture: &ColumnBuffer, emitter: Emitter) -> usize {
 }
 
 #[test]
-fn the_fall_of_the_thesis_lies_elsewhere() {
+fn green_light_is_higher_with_the_tracks_of_the_thesis() {
     let drawn = |energy_deposition, quenching_radius_pm| {
         let hard_spheres = HardSphereParameters { quenching_radius_pm, ..HardSphereParameters::default() };
         let deflection = RenderingParameters { collision_deflection: 0.0, ..RenderingParameters::default() };
@@ -151,7 +151,7 @@ fn the_fall_of_the_thesis_lies_elsewhere() {
         [Auto::Auto, Auto::Set(185.0)].map(|radius| drawn(TrackModel::HardSphereAtmosphere, radius));
     // Rows of 5 mrad: quenched by molecules, green light is only above 190 km; with one radius its middle is higher, but less so. Violet light is hardly
     // elsewhere at this energy.
-    let [green, violet] = [Emitter::OxygenGreen, Emitter::NitrogenIon]
+    let [green, violet] = [SpectralEmitter::OxygenGreen, SpectralEmitter::NitrogenIon]
         .map(|emitter| [&measured, &one_radius, &molecules].map(|picture| middle_row(picture, emitter)));
     assert!(green[2] + 20 < green[0], "{green:?}");
     assert!(green[2] < green[1] && green[1] < green[0], "{green:?}");

@@ -26,9 +26,9 @@ use super::{
 use crate::{
     Aurora, AuroraParameters, ParticleParameters, SpectrumShape,
     physics::{
-        atmosphere::atmosphere,
+        atmosphere::{LEVELS, atmosphere, level_altitude_km},
         attenuation_by_distance::AttenuationByDistance,
-        emission::{EMITTERS, Emission, Emitter, LineSet, PHOTONS_PER_KILORAYLEIGH, PerEmitter},
+        emission::{EMITTERS, Emission, LineSet, PHOTONS_PER_KILORAYLEIGH, PerEmitter, SpectralEmitter},
         precipitation::spectrum::ARC,
     },
     render::{
@@ -169,6 +169,75 @@ fn an_even_sheet_overhead_shows_its_column() {
     }
 }
 
+/// An observer above the center of the drawn square, and a dome that looks up or down.
+fn at_altitude(altitude_km: f64, dip_deg: f64, looks_up: bool) -> (View, FieldLines) {
+    let position = [0.0, 1e3 * altitude_km, 0.0];
+    let target = [0.0, if looks_up { 2e6 * altitude_km } else { 0.0 }, 0.0];
+    let camera = CameraParameters {
+        lens: Lens::Fisheye,
+        position: position.into(),
+        target: target.into(),
+        ..CameraParameters::default()
+    };
+    let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [128, 128], 0);
+    (view, FieldLines::new(dip_deg, 0.0, DVec3::from(position)))
+}
+
+#[test]
+fn an_even_sheet_shows_an_observer_within_or_above_it_the_column_in_front() {
+    let emission = emission();
+    let profiles = EmissionProfiles::new(&emission, &AttenuationByDistance::default());
+    let profile = emission.profile(ENERGY_EV);
+    let whole: f64 = profile.iter().map(|light| light[0]).sum();
+    let kilorayleigh_per_level = emission.column(ENERGY_EV).kilorayleigh[0] / whole;
+    let positions =
+        [130.0, 150.0, 250.0, 400.0, 500.0].into_iter().flat_map(|altitude| [(altitude, false), (altitude, true)]);
+    for ((altitude_km, looks_up), dip_deg) in
+        positions.flat_map(|position| [90.0, 77.0, -60.0].map(|dip| (position, dip)))
+    {
+        let (view, field) = at_altitude(altitude_km, dip_deg, looks_up);
+        let picture = draw(&sources(&slab(), PROMPT_AND_GREEN, 5.0, &field), &view, &field, &profiles, STEP);
+        let up = if looks_up { 1.0 } else { -1.0 };
+        for slant_deg in [0.0, 8.0, 30.0] {
+            let (sin, cos) = math::sin_cos(f64::to_radians(slant_deg));
+            // The integral along the line of sight, which begins at the observer, by levels of 1 km over a round Earth.
+            let path = |level: usize| {
+                let share = (EARTH_RADIUS_KM + altitude_km) / (EARTH_RADIUS_KM + level_altitude_km(level)) * sin;
+                1.0 / math::sqrt(1.0 - share * share)
+            };
+            // A level stands for half a kilometer on both sides.
+            let in_front = |level: usize| ((level_altitude_km(level) - altitude_km) * up + 0.5).clamp(0.0, 1.0);
+            let light_of = |level: usize| {
+                profile[level][0] * in_front(level) * if in_front(level) > 0.0 { path(level) } else { 0.0 }
+            };
+            let expected = (0..LEVELS).map(light_of).sum::<f64>() * kilorayleigh_per_level;
+            let [colatitude, longitude] = colatitude_and_longitude(&field, DVec3::new(sin * 0.8, up * cos, -sin * 0.6));
+            let found = f64::from(picture.sampler().light(longitude, colatitude)[0]);
+            assert!(
+                (found - expected).abs() <= 0.05 * expected + 3e-4 * kilorayleigh_per_level * whole,
+                "{altitude_km} km, dip {dip_deg}, {slant_deg} degrees from {}: {found} instead of {expected} kR",
+                if looks_up { "zenith" } else { "nadir" }
+            );
+        }
+    }
+}
+
+#[test]
+fn the_earth_hides_what_is_behind_its_limb() {
+    let profiles = EmissionProfiles::new(&emission(), &AttenuationByDistance::default());
+    let (view, field) = at_altitude(150.0, 90.0, false);
+    let light_of = |south_km: f32| -> f32 {
+        let cell =
+            AfterglowCell { cell_index: 0, position_km: [0.0, south_km], powers_w: [1e9], energy_ev: ENERGY_EV as f32 };
+        let picture = draw(&sources(&[cell], GREEN, 5.0, &field), &view, &field, &profiles, 0.002);
+        picture.light.iter().map(|light| light[0]).sum()
+    };
+    // A point at the altitude z is hidden beyond acos(R / (R + h)) + acos(R / (R + z)): one at 110 km beyond 2467 km along the ground, one at
+    // 400 km, which is above nearly all green light, beyond 3560 km.
+    let (seen, tops, hidden) = (light_of(2200.0), light_of(2750.0), light_of(3700.0));
+    assert!(seen > 0.0 && tops > 0.0 && tops < 0.2 * seen && hidden < 1e-3 * seen, "{seen} {tops} {hidden}");
+}
+
 #[test]
 fn a_ray_is_seen_where_every_lens_puts_it() {
     let profiles = EmissionProfiles::new(&emission(), &AttenuationByDistance::default());
@@ -238,9 +307,12 @@ fn every_measured_line_is_there_and_named_by_its_wavelength() {
     else {
         panic!()
     };
-    assert_eq!((green, red, fainter_red.0), ((Emitter::OxygenGreen, 1.0), (Emitter::OxygenRed, 1.0), red.0));
+    assert_eq!(
+        (green, red, fainter_red.0),
+        ((SpectralEmitter::OxygenGreen, 1.0), (SpectralEmitter::OxygenRed, 1.0), red.0)
+    );
     assert!((fainter_red.1 * 2.997 - 1.0).abs() < 1e-12, "{fainter_red:?}");
-    assert_eq!((all_bands, band.0), ((Emitter::Nitrogen, 1.0), Emitter::Nitrogen));
+    assert_eq!((all_bands, band.0), ((SpectralEmitter::Nitrogen, 1.0), SpectralEmitter::Nitrogen));
 }
 
 #[test]
@@ -344,7 +416,7 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
                 let bend = |row: usize| (light(row - 1) + light(row + 1) - 2.0 * light(row)).abs() / most;
                 let worst = (1..599).max_by(|a, b| bend(*a).total_cmp(&bend(*b))).unwrap();
                 // Lower edges are a few pixels high in the distance; red light has none.
-                let bound = if emitter == Emitter::OxygenRed { 0.01 } else { lower_edge };
+                let bound = if emitter == SpectralEmitter::OxygenRed { 0.01 } else { lower_edge };
                 assert!(
                     bend(worst) < bound,
                     "{energy_ev} eV, {north_km} km, {emitter:?}, row {worst}: {}",

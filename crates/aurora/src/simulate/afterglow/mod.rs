@@ -10,7 +10,7 @@ use map::DecayFactors;
 pub use map::{AfterglowCell, AfterglowMap};
 
 use super::AuroraParticles;
-use crate::physics::emission::{Emission, Emitter, red_line_altitudes::RED_ALTITUDES};
+use crate::physics::emission::{Emission, SpectralEmitter, red_line_altitudes::RED_ALTITUDES};
 
 /// Green cells per cell of the field.
 const GREEN_FINENESS: f64 = 8.0;
@@ -25,7 +25,7 @@ pub(crate) struct AfterglowDecay {
 impl AfterglowDecay {
     /// For a step in s of the aurora's time; lifetimes are from `emission`.
     pub(crate) fn new(emission: &Emission, seconds: f64) -> Self {
-        let green = |energy_ev| [emission.column(energy_ev).lifetime[Emitter::OxygenGreen.index()]];
+        let green = |energy_ev| [emission.column(energy_ev).lifetime[SpectralEmitter::OxygenGreen.index()]];
         let red = |energy_ev| emission.red_lifetimes(energy_ev);
         Self { green: DecayFactors::new(seconds, green), red: DecayFactors::new(seconds, red) }
     }

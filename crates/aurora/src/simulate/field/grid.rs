@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn places_fall_into_cells() {
+    fn positions_map_to_cells() {
         let grid = plane();
         assert_eq!(grid.cell([1.0, -2.0]), Some([0, 0]));
         assert_eq!(grid.cell([3.99, -0.01]), Some([5, 3]));

@@ -144,7 +144,7 @@ fn nothing_jumps_where_sheets_were_drawn_in_another_order_and_direction() {
     let positions = [beside(8.0), beside(105.0)].concat();
     let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &positions, Known::ByNumber);
     assert!(folds < 1e-3 && rays < 1e-2, "folds jump by {folds} km, rays by {rays}");
-    // What the figures are of a pattern that goes by the list of sheets.
+    // For comparison: the jumps of a pattern whose control points are identified by their positions in the list of sheets.
     let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &positions, Known::ByPosition);
     assert!(folds > 1.0 && rays > 0.3, "{folds} {rays}");
 }
@@ -166,7 +166,7 @@ fn nothing_jumps_where_a_sheet_joins_one_of_the_other_direction() {
     let positions: Vec<DVec2> = beside(0.0).into_iter().filter(|position| position.x.abs() > 60.0).collect();
     let [folds, rays] = jumps(&parameters, &sequence, &sequence.arrivals()[1..], &positions, Known::ByNumber);
     assert!(rays < 1e-2, "rays jump by {rays}, folds by {folds} km");
-    // Where they grow together; a split in the very position of that join moves the one segment there.
+    // Folds are compared only where the two sheets merge: the later split at the same point moves the one segment there.
     let [folds, _] = jumps(&parameters, &sequence, &sequence.arrivals()[1..2], &positions, Known::ByNumber);
     assert!(folds < 0.2, "folds jump by {folds} km");
 }
@@ -185,6 +185,7 @@ fn nothing_jumps_where_a_loop_begins_again() {
             .unwrap();
     let positions = [beside(0.0), beside(240.0)].concat();
     let [folds, rays] = jumps(&parameters, &sequence, &[3.0, 6.0, 9.0, 12.0, 18.0], &positions, Known::ByNumber);
-    // A segment that is whole pieces long but for rounding has one more or less a moment later: 50 m in the line through a fold.
+    // A segment whose length is a whole number of pieces up to rounding may have one piece more or less just after: 50 m in the line through
+    // a fold.
     assert!(folds < 0.1 && rays < 1e-2, "folds jump by {folds} km, rays by {rays}");
 }

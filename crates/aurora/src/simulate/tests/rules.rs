@@ -353,7 +353,7 @@ fn an_even_charge_is_the_count() {
 }
 
 #[test]
-fn births_without_end_are_held() {
+fn the_number_of_births_is_bounded() {
     let mut parameters = AuroraParameters { shapes: vec![shape(vec![form(Form::Arc)])], ..small() };
     parameters.particles.relocation =
         RelocationParameters { births_below: 1e6, max_births: 1e6, ..parameters.particles.relocation };

@@ -1,6 +1,12 @@
 //! Whether there is enough memory for the pictures of a job, checked before anything is drawn.
 
-use bansho_base::{host::memory, parameters::ProblemKind};
+use std::collections::{BTreeMap, HashMap};
+
+use bansho_base::{
+    host::{memory, plural::counted, printable::printable},
+    parameters::ProblemKind,
+    phenomenon::SharedMemory,
+};
 use bansho_render::{CompiledScene, Plan, display::BitDepth};
 
 use crate::job::{
@@ -8,8 +14,6 @@ use crate::job::{
     scene_file::SceneFile,
 };
 
-/// Pictures with fewer pixels than this are not checked.
-const MIN_CHECKED_PIXELS: f64 = 4e6;
 /// Bytes of a pixel of a frame: color and alpha in single precision.
 const FRAME_BYTES: f64 = 16.0;
 /// Bytes of the depth of a pixel, which only scene-linear files and refracted light need.
@@ -106,8 +110,19 @@ pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: Me
     let (drawn, whole) =
         (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
-    let phenomena: f64 = compiled.phenomena().map(|phenomenon| phenomenon.memory_bytes(drawn)).sum();
-    per_pixel.total(drawn, whole) + phenomena + plate_file_bytes(compiled) + PROCESS_BYTES
+    per_pixel.total(drawn, whole) + phenomena_bytes(compiled, plan, drawn) + plate_file_bytes(compiled) + PROCESS_BYTES
+}
+
+/// Memory of all phenomena for a picture of `drawn` pixels, bytes. What several of them share counts once.
+fn phenomena_bytes(compiled: &CompiledScene, plan: &Plan, drawn: f64) -> f64 {
+    let view = plan.view(plan.frames().start);
+    let own: f64 = compiled.phenomena().map(|phenomenon| phenomenon.memory_bytes(drawn)).sum();
+    let shared: BTreeMap<_, f64> = compiled
+        .phenomena()
+        .flat_map(|phenomenon| phenomenon.shared_memory(&view))
+        .map(|SharedMemory { key, bytes }| (key, bytes))
+        .collect();
+    own + shared.values().sum::<f64>()
 }
 
 /// Memory of the file of a plate, bytes, which does not depend on the size of the picture.
@@ -145,16 +160,13 @@ pub(crate) fn check(
 ) -> Result<(), JobError> {
     let (window, overscan) = (plan.window(), plan.overscan() as i64);
     let drawn = pixel_count([window.width, window.height], 0);
-    let whole = pixel_count(plan.size(), overscan);
-    if drawn.max(whole) * (request.tiles.max(1) as f64) < MIN_CHECKED_PIXELS {
-        return Ok(());
-    }
     let channels = channel_count(compiled, plan);
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channels);
     let bytes = estimated_bytes(compiled, plan, request);
     if memory::can_allocate(bytes) {
         return Ok(());
     }
+    check_without_pixels(scene, compiled, plan)?;
     // The overscan is the problem only if the picture without it would fit.
     let without_overscan = pixel_count(plan.size(), 0);
     if overscan > 0
@@ -171,8 +183,8 @@ pub(crate) fn check(
             format!("{width} x {height} pixels with this overscan would take {gib:.1} GiB; allowed: up to {max}");
         return Err(scene.error_at("picture.overscan", ProblemKind::Conflict(message)));
     }
-    let plate_file = plate_file_bytes(compiled);
-    let fits = |thousandths| memory::can_allocate(plate_file + 0.001 * thousandths as f64 * (bytes - plate_file));
+    let fixed = fixed_bytes(compiled, plan);
+    let fits = |thousandths| memory::can_allocate(fixed + 0.001 * thousandths as f64 * (bytes - fixed));
     let thousandths = memory::largest_fitting_count(1000, fits);
     let scale = (0.001 * thousandths as f64).sqrt();
     let size = [window.width, window.height];
@@ -182,6 +194,58 @@ pub(crate) fn check(
         return Err(error.into());
     }
     Err(scene.error_at("picture.size", ProblemKind::Conflict(error.to_string())))
+}
+
+/// Memory that does not depend on the size of the picture, bytes.
+fn fixed_bytes(compiled: &CompiledScene, plan: &Plan) -> f64 {
+    phenomena_bytes(compiled, plan, 0.0) + plate_file_bytes(compiled) + PROCESS_BYTES
+}
+
+/// Checks that the phenomena fit into memory whatever the size of the picture.
+///
+/// # Errors
+/// They do not. The error names the kind of phenomenon that takes most.
+fn check_without_pixels(scene: &SceneFile, compiled: &CompiledScene, plan: &Plan) -> Result<(), JobError> {
+    let fixed = fixed_bytes(compiled, plan);
+    if memory::can_allocate(fixed) {
+        return Ok(());
+    }
+    let plate = plate_file_bytes(compiled);
+    if plate > 0.5 * fixed {
+        let megapixels = (1e-6 * plate / PLATE_FILE_BYTES).ceil() as i64;
+        let fits = |megapixels: i64| memory::can_allocate(fixed - plate + 1e6 * PLATE_FILE_BYTES * megapixels as f64);
+        let file = plan.scene().plate.image.as_ref().map_or("", |image| &image.0);
+        let message = format!(
+            "{}: its {megapixels} megapixels would take {:.1} GiB; allowed: up to {} megapixels",
+            printable(file),
+            fixed / GIB,
+            memory::largest_fitting_count(megapixels, fits)
+        );
+        return Err(scene.error_at("plate.image", ProblemKind::Conflict(message)));
+    }
+    let view = plan.view(plan.frames().start);
+    let mut kinds: BTreeMap<&str, (usize, f64)> = BTreeMap::new();
+    let kind_of: HashMap<&str, &str> =
+        plan.scene().instances.iter().map(|instance| (instance.name.as_str(), instance.kind.key)).collect();
+    for phenomenon in compiled.phenomena() {
+        let Some(kind) = kind_of.get(phenomenon.info().name) else { continue };
+        let shared: f64 = phenomenon.shared_memory(&view).iter().map(|shared| shared.bytes).sum();
+        let (count, bytes) = kinds.entry(kind).or_default();
+        *count += 1;
+        *bytes += phenomenon.memory_bytes(0.0) + shared;
+    }
+    let most = kinds.into_iter().max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1));
+    let Some((kind, (count, bytes))) = most else { return Ok(()) };
+    let fits =
+        |count_that_fits: i64| memory::can_allocate(fixed - bytes + bytes * count_that_fits as f64 / count as f64);
+    let message = format!(
+        "the phenomena of this scene would take {:.1} GiB, most of it {}, whatever the size of the picture; allowed: up to {} of these, or \
+         fewer particles",
+        fixed / GIB,
+        counted(count, &format!("[[{kind}]]")),
+        memory::largest_fitting_count(count as i64, fits)
+    );
+    Err(scene.error_at(kind, ProblemKind::Conflict(message)))
 }
 
 #[cfg(test)]

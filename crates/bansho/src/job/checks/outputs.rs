@@ -53,8 +53,8 @@ pub(crate) fn check_overwriting(
         match policy.check(&folder.resolved(&path)) {
             Ok(()) => {}
             Err(OverwriteError::Input) => return Err(OptionError::OutputIsInput { path }.into()),
-            Err(OverwriteError::NotMadeByBansho) if unmarked.is_none() => unmarked = Some(path),
-            Err(OverwriteError::NotMadeByBansho) => others += 1,
+            Err(OverwriteError::NotMadeByBansho | OverwriteError::Link) if unmarked.is_none() => unmarked = Some(path),
+            Err(OverwriteError::NotMadeByBansho | OverwriteError::Link) => others += 1,
         }
     }
     unmarked.map_or(Ok(()), |path| Err(OptionError::NotMadeByBansho { path, others }.into()))

@@ -122,6 +122,15 @@ pub enum OptionError {
     /// Encoded alpha for a view that does not encode.
     #[error("the view `raw` encodes nothing, so its alpha is linear; allowed: linear, or another view")]
     RawAlpha,
+    /// Linear light in a format that only has colors for display.
+    #[error(
+        "the view `raw` is linear light in ACEScg, which {path} cannot say; allowed: .exr, .png or .apng, or another view",
+        path = .path.display()
+    )]
+    RawFormat {
+        /// The output.
+        path: PathBuf,
+    },
     /// The list of frames is empty.
     #[error("no frame is selected; allowed: at least one")]
     NoFrames,

@@ -102,15 +102,16 @@ impl PreparedSimulation {
         let (mut last, finished) = (None, FinishedFiles::default());
         for (index, &number) in self.frames.iter().enumerate() {
             check(observer).map_err(|_| JobError::Cancelled)?;
+            let mut told = Vec::new();
             if last.is_none_or(|last| number != last + 1) {
-                self.snapshots.warm_up(&mut shot, last, number, observer, observer)?;
+                told = self.snapshots.warm_up(&mut shot, last, number, observer, observer)?;
             }
             shot.advance(number, observer)?;
-            self.snapshots.save(&shot, number, observer)?;
+            self.snapshots.save(&shot, number, &told, observer, observer)?;
             last = Some(number);
             let _stage = StageGuard::begin(observer, Stage::Write);
             let path = self.pattern.path(number);
-            atomic::write_bytes_with(&path, &ply::encode(&shot.particles()), &self.overwrite)?;
+            atomic::write_bytes(&path, &ply::encode(&shot.particles()), &self.overwrite)?;
             finished.record(path.clone());
             observer.frame_done(&FrameDone { number, path: Some(path), drawn: index + 1 });
         }

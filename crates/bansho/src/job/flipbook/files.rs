@@ -4,15 +4,18 @@ use std::path::{Path, PathBuf};
 
 use bansho_base::{
     color::{AlphaConvention, View},
-    frame::{DisplayImage, DisplayPixels, Frame, FrameHeader},
+    frame::{DisplayEncoding, DisplayImage, DisplayPixels, Frame, FrameHeader},
     host::observer::{Observer, Stage, StageGuard, check},
     image::{Image, Rect},
 };
 use bansho_media::{
-    exr,
+    MediaError, exr,
     files::{atomic, overwrite_policy::OverwritePolicy, provenance},
     format::OutputKind,
-    imageops::sprite_sheet::{SheetLayout, tile, tile_display},
+    imageops::{
+        bleed::bleed_colors,
+        sprite_sheet::{SheetLayout, tile, tile_display},
+    },
     png::{self, PngEffort},
 };
 use bansho_render::{
@@ -27,6 +30,7 @@ use super::{
 };
 use crate::job::{checks::finished_files::FinishedFiles, error::JobError};
 
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 /// One frame of a flipbook.
@@ -152,7 +156,7 @@ impl Files {
 
     /// Writes one of the files, atomically.
     fn write_file(&self, path: PathBuf, bytes: &[u8], finished: &FinishedFiles) -> Result<(), JobError> {
-        atomic::write_bytes_with(&path, bytes, &self.overwrite)?;
+        atomic::write_bytes(&path, bytes, &self.overwrite)?;
         finished.record(path);
         Ok(())
     }
@@ -166,7 +170,9 @@ impl Files {
         let pixels = motion.pixels().iter().map(|&[x, y]| [x, y, 0.0, 1.0]).collect();
         let motion =
             Image::from_pixels(width, height, pixels).unwrap_or_else(|| Image::filled(width, height, [0.0; 4]));
-        for (sheet, beauty) in [("color", tile(&colors, sheet.columns, 0, [0.0; 4])?), ("motion", motion)] {
+        let color = tile(&colors, sheet.columns, 0, [0.0; 4])?;
+        let encode_color: fn(&Frame, &Path) -> Result<Vec<u8>, MediaError> = exr::encode;
+        for (sheet, beauty, encode) in [("color", color, encode_color), ("motion", motion, exr::encode_data)] {
             let path = self.sheet_path(sheet);
             let header = FrameHeader { fingerprint: fingerprint(tiles, sheet), ..header.clone() };
             let content = Rect::from_size(beauty.width(), beauty.height());
@@ -179,7 +185,7 @@ impl Files {
                 content,
                 metadata: Vec::new(),
             };
-            let bytes = exr::encode(&frame, &path)?;
+            let bytes = encode(&frame, &path)?;
             self.write_file(path, &bytes, finished)?;
         }
         Ok(())
@@ -192,14 +198,18 @@ impl Files {
         scale: f32,
         finished: &FinishedFiles,
     ) -> Result<(), JobError> {
-        let colors: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.display().cloned()).collect();
+        let mut colors: Vec<DisplayImage> = tiles.iter().filter_map(|tile| tile.display().cloned()).collect();
+        // Each tile for itself, so that no color comes from another frame.
+        colors.par_iter_mut().for_each(bleed_colors);
         let color = tile_display(&colors, sheet.columns, 0, [0; 4])?;
-        let alpha = DisplayImage { opaque: true, pixels: alpha_as_gray(&color.pixels), ..color };
+        let encoding = DisplayEncoding::Data;
+        let alpha = DisplayImage { opaque: true, encoding, pixels: alpha_as_gray(&color.pixels), ..color };
         let motion = tiles.iter().map(|tile| DisplayImage {
             width: tile.motion.pixels.width(),
             height: tile.motion.pixels.height(),
             opaque: true,
             alpha: self.alpha,
+            encoding,
             pixels: DisplayPixels::Sixteen(
                 tile.motion.pixels.pixels().iter().map(|&motion| motion::encode(motion, scale)).collect(),
             ),
@@ -235,7 +245,7 @@ impl Files {
             }
             false => json!({
                 "file": name(&self.sheet_path("color")),
-                "space": "sRGB",
+                "space": if self.view == View::RAW { "ACEScg" } else { "sRGB" },
                 "alpha": "straight",
                 "alpha_convention": self.alpha.name(),
             }),
@@ -285,7 +295,10 @@ impl Files {
         let (values, sampled, additive) = match self.alpha {
             AlphaConvention::Linear => (
                 "linear",
-                "sRGB texture, decoded when it is sampled; the target is linear or an sRGB render target",
+                match self.view == View::RAW {
+                    true => "linear texture; the target is linear or an sRGB render target",
+                    false => "sRGB texture, decoded when it is sampled; the target is linear or an sRGB render target",
+                },
                 json!({
                     "mode": "additive, color times alpha",
                     "factors": ["source_alpha", "one"],

@@ -13,7 +13,10 @@ use bansho_base::{
     image::Rect,
 };
 use bansho_media::{
-    files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
+    files::{
+        naming::{self, OutputPattern},
+        overwrite_policy::OverwritePolicy,
+    },
     format::OutputKind,
     imageops::sprite_sheet::SheetLayout,
 };
@@ -163,7 +166,8 @@ impl Flipbook {
 
     fn files(&self, overwrite: OverwritePolicy) -> Result<Files, JobError> {
         let stem = &self.scene.stem;
-        let path = self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(format!("{stem}.png")));
+        let default = || PathBuf::from("out").join(stem).join(format!("{}.png", naming::literal_pattern(stem)));
+        let path = self.out.clone().unwrap_or_else(default);
         let pattern = OutputPattern::parse(&path, 1)?;
         let is_picture = match pattern.kind() {
             OutputKind::Png | OutputKind::Exr => true,
@@ -173,7 +177,7 @@ impl Flipbook {
             return Err(OptionError::SheetFormat { path, allowed: "NAME.png or NAME.exr" }.into());
         }
         let alpha = prepare::alpha_convention(self.alpha, self.view, AlphaConvention::Linear)?;
-        let base = path.with_extension("");
+        let base = pattern.path(0).with_extension("");
         let (kind, view, bits, gltf) = (pattern.kind(), self.view, self.bits, self.gltf);
         Ok(Files { base, kind, view, bits, alpha, gltf, overwrite })
     }

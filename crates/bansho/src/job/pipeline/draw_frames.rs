@@ -154,11 +154,12 @@ fn advance(
     stop_on_failure: &StopOnFailure,
     observer: &dyn JobObserver,
 ) -> Result<(), JobError> {
+    let mut told = Vec::new();
     if last.is_none_or(|last| number != last + 1) {
-        snapshots.warm_up(shot, last, number, stop_on_failure, observer)?;
+        told = snapshots.warm_up(shot, last, number, stop_on_failure, observer)?;
     }
     shot.advance(number, stop_on_failure)?;
-    snapshots.save(shot, number, stop_on_failure)
+    snapshots.save(shot, number, &told, stop_on_failure, observer)
 }
 
 /// How many frames whose light takes this many bytes may be in flight: one for each thread and one more, as far as memory and the sink allow.

@@ -3,10 +3,12 @@
 use bansho_base::{
     frame::Frame,
     host::observer::{Cancelled, Observer},
+    phenomenon::SnapshotError,
 };
 use bansho_render::{
     RenderError, Shot,
     display::{DisplayFrame, DisplayOptions},
+    snapshot,
 };
 
 /// A source of frames: a [`Shot`], or in tests a source with a known state and known pictures. The methods are those of [`Shot`].
@@ -24,6 +26,10 @@ pub(crate) trait FrameSource: Send {
     fn recycle(&mut self, recycled: Frame);
     fn snapshot(&self) -> Vec<u8>;
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError>;
+    /// Whether a snapshot is whole, of whatever scene.
+    fn check_snapshot(&self, bytes: &[u8]) -> Result<(), SnapshotError> {
+        snapshot::check(bytes)
+    }
 }
 
 impl FrameSource for Shot {

@@ -13,6 +13,7 @@ use bansho_base::{
     frame::Frame,
     host::observer::{Observer, Stage, StagePart},
 };
+use bansho_media::MediaError;
 
 use crate::job::{error::JobError, observer::JobObserver};
 
@@ -84,9 +85,14 @@ impl InFlightFrames {
         self.lock().recycled.take()
     }
 
-    /// Keeps the first failure, and cancels the remaining work.
+    /// Keeps the first failure, and cancels the remaining work. A frame of a film that another thread writes can fail as a consequence of it and
+    /// arrive here earlier; the cause takes its place.
     pub(crate) fn fail(&self, error: JobError) {
-        self.lock().error.get_or_insert(error);
+        let mut state = self.lock();
+        if state.error.as_ref().is_none_or(follows_from_another) {
+            state.error = Some(error);
+        }
+        drop(state);
         self.failed.store(true, Ordering::Relaxed);
     }
 
@@ -99,6 +105,11 @@ impl InFlightFrames {
     pub(crate) fn take_error(&self) -> Option<JobError> {
         self.lock().error.take()
     }
+}
+
+/// Whether a failure only says that another one came before it.
+fn follows_from_another(error: &JobError) -> bool {
+    matches!(error, JobError::Media(MediaError::AlreadyFailed { .. }))
 }
 
 /// Marks frame `index` as finished when it is dropped, also by a panic, so that no thread waits for it forever.
@@ -147,8 +158,24 @@ impl Observer for StopOnFailure<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
     use crate::job::testing::{blank, plan};
+
+    #[test]
+    fn the_cause_of_a_failure_is_kept_whichever_thread_is_first() {
+        let path = PathBuf::from("film.mov");
+        let cause = || JobError::Media(MediaError::DiskFull { path: path.clone() });
+        let consequence = || JobError::Media(MediaError::AlreadyFailed { path: path.clone() });
+        for failures in [[cause(), consequence()], [consequence(), cause()]] {
+            let in_flight = InFlightFrames::default();
+            failures.into_iter().for_each(|error| in_flight.fail(error));
+            assert!(in_flight.has_failed());
+            let kept = in_flight.take_error();
+            assert!(matches!(kept, Some(JobError::Media(MediaError::DiskFull { .. }))), "{kept:?}");
+        }
+    }
 
     #[test]
     fn the_pixels_of_a_frame_are_free_before_it_is_finished() {

@@ -7,7 +7,7 @@ use std::{
 
 use bansho_base::host::observer::{Observer, Stage, StageGuard};
 use bansho_media::files::{atomic, file_identity::resolved, overwrite_policy::OverwritePolicy};
-use bansho_render::Plan;
+use bansho_render::{Plan, RenderError};
 
 use super::frame_source::FrameSource;
 use crate::job::{
@@ -59,7 +59,7 @@ impl Snapshots {
     }
 
     /// Advances `shot`, which is at frame `last`, toward frame `number`: restores the latest usable snapshot, then steps to each frame before
-    /// `number` at which a snapshot is due or was unusable, and writes it.
+    /// `number` at which a snapshot is due or was unusable, and writes it. Returns the frames whose snapshots were reported as unusable.
     ///
     /// # Errors
     /// The observer canceled the job, or a snapshot cannot be written.
@@ -70,9 +70,9 @@ impl Snapshots {
         number: i64,
         stop_on_failure: &dyn Observer,
         observer: &dyn JobObserver,
-    ) -> Result<(), JobError> {
+    ) -> Result<Vec<i64>, JobError> {
         if self.folder.is_none() {
-            return Ok(());
+            return Ok(Vec::new());
         }
         let (last, number) = (last.map(|last| self.wrapped_frame(last)), self.wrapped_frame(number));
         let past = last.filter(|&last| last <= number);
@@ -84,12 +84,12 @@ impl Snapshots {
         let first = sought.restored.or(past).map_or(earliest, |reached| reached.saturating_add(1));
         for stop in (first..number).filter(|stop| self.is_due(*stop) || sought.unusable.contains(stop)) {
             shot.advance(stop, stop_on_failure)?;
-            self.save(shot, stop, stop_on_failure)?;
+            self.save(shot, stop, &sought.unusable, stop_on_failure, observer)?;
         }
-        Ok(())
+        Ok(sought.unusable)
     }
 
-    /// Steps through a shot and writes every snapshot that is due up to frame `last` and does not exist. Tells how many that were.
+    /// Steps through a shot and writes every snapshot that is due up to frame `last` and does not exist. Returns their number.
     ///
     /// # Errors
     /// The observer canceled the job, or a snapshot cannot be written.
@@ -102,13 +102,15 @@ impl Snapshots {
         let Some(folder) = &self.folder else { return Ok(0) };
         let due =
             (self.first_frame..=self.wrapped_frame(last)).step_by(usize::try_from(self.interval).unwrap_or(usize::MAX));
-        let missing: Vec<i64> = due.filter(|number| !self.path(folder, *number).exists()).collect();
+        // A damaged snapshot is reported by `warm_up`.
+        let is_whole = |path: &Path| read(path).is_ok_and(|bytes| shot.check_snapshot(&bytes).is_ok());
+        let missing: Vec<i64> = due.filter(|number| !is_whole(&self.path(folder, *number))).collect();
         let mut reached = None;
         for &number in &missing {
             // From the latest one before it, which may have been written by another job; one that is unusable is replaced.
             self.warm_up(shot, reached, number, observer, observer)?;
             shot.advance(number, observer)?;
-            self.save(shot, number, observer)?;
+            self.save(shot, number, &missing, observer, observer)?;
             reached = Some(number);
         }
         Ok(missing.len())
@@ -154,20 +156,38 @@ impl Snapshots {
         number.abs_diff(self.first_frame).is_multiple_of(self.interval)
     }
 
-    /// Writes the state at frame `number` if a snapshot is due or exists there, unless the file already contains this state.
-    pub(crate) fn save(&self, shot: &dyn FrameSource, number: i64, observer: &dyn Observer) -> Result<(), JobError> {
+    /// Writes the state at frame `number` if a snapshot is due or exists there, unless the file already contains this state. Warns of a snapshot that it
+    /// replaces, unless its frame is among `reported`.
+    pub(crate) fn save(
+        &self,
+        shot: &dyn FrameSource,
+        number: i64,
+        reported: &[i64],
+        stages: &dyn Observer,
+        observer: &dyn JobObserver,
+    ) -> Result<(), JobError> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let number = self.wrapped_frame(number);
         let path = self.path(folder, number);
         if !self.is_due(number) && !path.exists() {
             return Ok(());
         }
-        let _stage = StageGuard::begin(observer, Stage::Write);
+        let _stage = StageGuard::begin(stages, Stage::Write);
         let state = shot.snapshot();
-        if read(&path).is_ok_and(|existing| existing == state) {
-            return Ok(());
+        match read(&path) {
+            Ok(existing) if existing == state => return Ok(()),
+            Ok(existing) if !reported.contains(&number) => {
+                let reason =
+                    shot.check_snapshot(&existing).map_or_else(RenderError::from, |()| RenderError::ForeignSnapshot);
+                observer.warning(&Warning::SnapshotRejected { path: path.clone(), reason });
+            }
+            Ok(_) => {}
+            Err(error) if error.kind() == io::ErrorKind::NotFound || reported.contains(&number) => {}
+            Err(error) => {
+                observer.warning(&Warning::SnapshotUnreadable { path: path.clone(), reason: error.to_string() });
+            }
         }
-        Ok(atomic::write_bytes_with(&path, &state, &self.overwrite)?)
+        Ok(atomic::write_bytes(&path, &state, &self.overwrite)?)
     }
 }
 
@@ -203,15 +223,13 @@ fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::{host::observer::Unobserved, phenomenon::SnapshotError};
-    use bansho_render::RenderError;
-
     use super::*;
     use crate::job::{
         error::OptionError,
         pipeline::draw_frames::draw_frames,
         testing::{self, CountingSource, FunctionSink, RecordingObserver, plan},
     };
+    use bansho_base::{host::observer::Unobserved, phenomenon::SnapshotError};
 
     fn snapshots(folder: &tempfile::TempDir) -> Snapshots {
         Snapshots::new(folder.path().join("states"), &plan(), 5, OverwritePolicy::default())
@@ -256,11 +274,11 @@ mod tests {
         fs::remove_file(path(1)).unwrap();
         assert_eq!(write(11, &RecordingObserver::default()), (2, 5 + 5));
         assert_eq!([-4, 1, 6, 11].map(|number| fs::read(path(number)).unwrap()), [-4, 1, 6, 11].map(testing::state));
-        // A damaged one before a missing one is replaced on the way.
+        // A damaged snapshot before a missing one is replaced, and reported once.
         fs::write(path(6), b"").unwrap();
         fs::remove_file(path(11)).unwrap();
         let observer = RecordingObserver::default();
-        assert_eq!(write(11, &observer), (1, 10), "from the state at 1");
+        assert_eq!(write(11, &observer), (2, 10), "from the state at 1");
         assert_eq!(observer.warnings.lock().unwrap().len(), 1);
         assert_eq!(fs::read(path(6)).unwrap(), testing::state(6));
         let stopped = RecordingObserver::default();
@@ -282,6 +300,25 @@ mod tests {
         let reason = RenderError::Snapshot(SnapshotError::Damaged);
         assert_eq!(*observer.warnings.lock().unwrap(), [Warning::SnapshotRejected { path: path.clone(), reason }]);
         assert_eq!(fs::read(&path).unwrap(), whole);
+    }
+
+    #[test]
+    fn a_damaged_state_that_is_replaced_on_the_way_is_reported() {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshots = snapshots(&folder);
+        let frames: Vec<i64> = (-4..9).collect();
+        steps(&snapshots, &frames, &RecordingObserver::default());
+        let path = snapshots.path(snapshots.folder.as_deref().unwrap(), 6);
+        for (contents, reason) in [
+            (b"BANSHOSScut".to_vec(), RenderError::Snapshot(SnapshotError::Damaged)),
+            (testing::state(5), RenderError::ForeignSnapshot),
+        ] {
+            fs::write(&path, contents).unwrap();
+            let observer = RecordingObserver::default();
+            steps(&snapshots, &frames, &observer);
+            assert_eq!(*observer.warnings.lock().unwrap(), [Warning::SnapshotRejected { path: path.clone(), reason }]);
+            assert_eq!(fs::read(&path).unwrap(), testing::state(6));
+        }
     }
 
     #[test]
@@ -368,7 +405,7 @@ mod tests {
         snapshots.loop_frames = Some(10);
         assert_eq!([-4, 5, 6, 16, -5].map(|number| snapshots.wrapped_frame(number)), [-4, 5, -4, -4, 5]);
         let mut shot = CountingSource::new();
-        snapshots.save(&shot, 6, &Unobserved).unwrap();
+        snapshots.save(&shot, 6, &[], &Unobserved, &Unobserved).unwrap();
         assert_eq!(numbers(snapshots.folder.as_deref().unwrap()).unwrap(), [-4]);
         let observer = RecordingObserver::default();
         snapshots.warm_up(&mut shot, None, 7, &observer, &observer).unwrap();

@@ -31,7 +31,7 @@ pub(crate) fn write(
     overwrite: &OverwritePolicy,
 ) -> Result<(), MediaError> {
     let text = format!("{:#}\n", describe(header, phenomena, picture));
-    atomic::write_bytes_with(&path(picture), text.as_bytes(), overwrite)
+    atomic::write_bytes(&path(picture), text.as_bytes(), overwrite)
 }
 
 /// Whether the complete metadata of a picture with this fingerprint exists.

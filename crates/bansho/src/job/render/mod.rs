@@ -14,7 +14,7 @@ use bansho_base::{
 };
 use bansho_media::{
     imageops::sprite_sheet::SheetLayout,
-    output::sink::{FrameSlot, Picture},
+    output::sink::{FinishedPicture, FrameSlot},
 };
 use bansho_render::Shot;
 
@@ -113,7 +113,7 @@ impl PreparedJob {
         let _stage = StageGuard::begin(observer, Stage::Write);
         let picture = contact_sheet::compose(&collector.into_tiles(), sheet)?;
         let fingerprint = self.contact_sheet_fingerprint();
-        sink.write(FrameSlot { index: 0, number: self.frames[0] }, Picture::Display(&picture, &fingerprint))?;
+        sink.write(FrameSlot { index: 0, number: self.frames[0] }, FinishedPicture::Display(&picture, &fingerprint))?;
         Ok(sink.finish()?)
     }
 

@@ -13,7 +13,7 @@ use bansho_base::{
 use bansho_media::{
     files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
     format::{OutputKind, PictureFormat},
-    output::sink::{FrameSlot, Picture, Sink, SinkOptions},
+    output::sink::{FinishedPicture, FrameSlot, Sink, SinkOptions},
 };
 use bansho_render::{
     Plan,
@@ -96,7 +96,7 @@ impl Format {
         self.write_metadata(sink, &frame.header, &frame.metadata)?;
         let slot = FrameSlot { index, number: frame.header.number };
         let _stage = StageGuard::begin(observer, Stage::Write);
-        Ok(sink.write(slot, Picture::Linear(frame))?)
+        Ok(sink.write(slot, FinishedPicture::Linear(frame))?)
     }
 
     /// Writes the display pixels of a frame.
@@ -111,7 +111,7 @@ impl Format {
         self.write_metadata(sink, &frame.header, &frame.metadata)?;
         let slot = FrameSlot { index, number: frame.header.number };
         let _stage = StageGuard::begin(observer, Stage::Write);
-        Ok(sink.write(slot, Picture::Display(&frame.image, &frame.header.fingerprint))?)
+        Ok(sink.write(slot, FinishedPicture::Display(&frame.image, &frame.header.fingerprint))?)
     }
 
     /// Writes the metadata of a frame if requested: before the picture, so that every existing picture has its metadata.

@@ -18,7 +18,7 @@ use bansho_media::{
     imageops::sprite_sheet::SheetLayout,
 };
 use bansho_render::{CompiledScene, Plan, PlanOptions, display::BitDepth};
-use bansho_scene::{Positions, SceneOptions};
+use bansho_scene::{Positions, SceneOptions, picture};
 
 use super::{
     contact_sheet::{self, ContactBackground},
@@ -80,6 +80,11 @@ impl PreparedJob {
         self.memory_bytes
     }
 
+    /// Which existing files may be overwritten.
+    pub fn overwrite_policy(&self) -> &OverwritePolicy {
+        &self.format.overwrite
+    }
+
     /// What the user should know before the job begins.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
@@ -110,7 +115,11 @@ pub fn check_scene(scene: &SceneFile) -> Result<(Arc<CompiledScene>, Plan), JobE
 
 /// Warnings about how the phenomena of a scene will look, each with its position in the file.
 pub fn remarks(scene: &SceneFile, compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<Warning> {
-    let remarks = bansho_render::remarks::remarks(compiled, plan);
+    let changed = scene.changed().unwrap_or_else(|_| scene.text.clone());
+    let of_rate =
+        picture::frame_rate_remark(&changed).map(|message| ("picture".to_owned(), Remark::at("fps", message)));
+    let mut remarks = bansho_render::remarks::remarks(compiled, plan);
+    remarks.extend(of_rate);
     if remarks.is_empty() {
         return Vec::new();
     }
@@ -133,6 +142,7 @@ impl Job {
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
         self.check_metadata(kind)?;
+        check_view(self.view, kind, &self.output_path())?;
         let alpha = alpha_convention(self.alpha, self.view, AlphaConvention::Encoded)?;
         let compiled = self.scene.compile(scene.with_options(&self.scene_options())?, &self.scene.assets())?;
         let mut plan = Plan::new(&compiled, &self.plan_options(kind))?;
@@ -174,8 +184,10 @@ impl Job {
     /// The name of the output: the option, or the default.
     pub fn output_path(&self) -> PathBuf {
         let stem = &self.scene.stem;
-        let name =
-            if self.contact_sheet.is_some() { format!("{stem}.sheet.png") } else { naming::default_sequence(stem) };
+        let name = match self.contact_sheet {
+            Some(_) => format!("{}.sheet.png", naming::literal_pattern(stem)),
+            None => naming::default_sequence(stem),
+        };
         self.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem).join(name))
     }
 
@@ -263,6 +275,11 @@ impl Job {
     fn warnings(&self, job: &PreparedJob) -> Vec<Warning> {
         let kind = job.format.pattern.kind();
         let mut warnings: Vec<Warning> = outside_range(&job.plan, &job.frames).into_iter().collect();
+        if let Some(path) = &self.out
+            && let Some(part) = OutputPattern::literal_part(path)
+        {
+            warnings.push(Warning::LiteralName { path: path.clone(), part });
+        }
         warnings.extend(remarks(&self.scene, &job.compiled, &job.plan));
         if self.bits == BitDepth::Sixteen && !kind.takes_sixteen_bits() {
             warnings.push(Warning::BitsUnused { kind });
@@ -287,6 +304,17 @@ impl Job {
         }
         warnings
     }
+}
+
+/// Checks that files of this `kind` can say what the pixels of a view are.
+///
+/// # Errors
+/// The view `raw` in a format that only has colors for display.
+pub(crate) fn check_view(view: View, kind: OutputKind, path: &Path) -> Result<(), OptionError> {
+    if view != View::RAW || kind.takes_linear_acescg() {
+        return Ok(());
+    }
+    Err(OptionError::RawFormat { path: path.to_path_buf() })
 }
 
 /// The convention of straight alpha: `option`, or `default` if it is `None`. For the view `raw`, which encodes nothing, the default is linear.

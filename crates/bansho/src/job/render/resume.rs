@@ -1,6 +1,6 @@
 //! Which frames of a job exist already and are complete.
 
-use bansho_media::output::resume::existing_fingerprint;
+use bansho_media::output::frame_file::existing_fingerprint;
 
 use super::{metadata, prepare::PreparedJob};
 use crate::job::{checks::finished_files::FinishedFiles, error::JobError};

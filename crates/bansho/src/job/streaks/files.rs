@@ -93,7 +93,7 @@ impl TextureWriter {
 
     /// Writes a file, atomically.
     pub(crate) fn write_file(&self, path: &Path, bytes: &[u8]) -> Result<(), JobError> {
-        Ok(atomic::write_bytes_with(path, bytes, &self.overwrite)?)
+        Ok(atomic::write_bytes(path, bytes, &self.overwrite)?)
     }
 
     /// Writes the pictures of a texture. `speckled` is its opacity times the brightness of drops that oscillate.
@@ -146,7 +146,9 @@ impl TextureWriter {
         let (header, content) = (self.header(file, opacity), Rect::from_size(width, height));
         let frame = Frame { header, beauty, depth: None, channels, opaque: false, metadata: Vec::new(), content };
         let path = self.folder.join(file);
-        self.write_file(&path, &exr::encode(&frame, &path)?)?;
+        // Without a light nothing in the file is a color.
+        let bytes = if self.light.is_some() { exr::encode(&frame, &path)? } else { exr::encode_data(&frame, &path)? };
+        self.write_file(&path, &bytes)?;
         Ok(WrittenTexture { scale: None, lit: None })
     }
 
@@ -155,7 +157,7 @@ impl TextureWriter {
     }
 
     fn header(&self, file: &str, image: &Image<1>) -> FrameHeader {
-        let identity: [[f32; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+        let identity: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
         FrameHeader {
             number: 0,
             // So that readers do not scale the values.

@@ -2,11 +2,11 @@
 //!
 //! With the feature `rayon` of this crate (`bansho` enables it by default) this module re-exports rayon: work runs in the pool whose
 //! `ThreadPool::install` called it, otherwise in rayon's global pool, whose threads rayon starts when it is first used. Without the feature,
-//! [`sequential`] has the same names, everything runs on the calling thread, and the library starts no thread: for games, which divide the
-//! cores among their own jobs, and for hosts without threads.
+//! [`sequential`] gives rayon's names to the iterators of the standard library, everything runs on the calling thread, and the library starts
+//! no thread: for games, which divide the cores among their own jobs, and for hosts without threads.
 //!
 //! Both give the same bytes, by the rules that make the result independent of the number of threads: items do not affect each other, results
-//! are in the order of the items, and `reduce` is only given operations that are associative to the bit, such as a maximum, with their identity.
+//! are in the order of the items, and `reduce_with` is only given operations that are associative to the bit, such as a maximum.
 //!
 //! ```
 //! use bansho_base::host::parallel::prelude::*;

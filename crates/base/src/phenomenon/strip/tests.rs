@@ -52,6 +52,24 @@ fn crossfades_mix_light_and_transmittance_and_keep_what_is_nearest() {
 }
 
 #[test]
+fn parts_of_an_exposure_are_averaged() {
+    let mut strip = Strip::default();
+    strip.reset(Rect::from_size(3, 1), Some(&|_| &[9.0, 8.0, 7.0]), 0);
+    let (mut first, mut second) = (Strip::default(), Strip::default());
+    first.reset_within(Rect { x: 1, y: 0, width: 2, height: 1 }, &strip);
+    second.reset_within(Rect { x: 0, y: 0, width: 2, height: 1 }, &strip);
+    assert_eq!((first.plate_depth(0), first.plate_depth(1), second.plate_depth(0)), (8.0, 7.0, 9.0));
+    first.add_row_behind(0, [&[4.0, 8.0]; 3], Some(&[0.5, 1.0]), &[2.0, 2.0]);
+    second.add_behind(1, [2.0, 4.0, 6.0], [1.0, 0.5, 0.0], 1.0);
+    strip.add_exposure_part(&first, 0.5, &[]);
+    strip.add_exposure_part(&second, 0.5, &[]);
+    assert_eq!(strip.radiance, [vec![0.0, 3.0, 4.0], vec![0.0, 4.0, 4.0], vec![0.0, 5.0, 4.0]]);
+    // What is not covered for a while transmits all light meanwhile.
+    assert_eq!([0, 1, 2].map(|pixel| strip.transmittance(pixel)), [[1.0; 3], [0.75, 0.5, 0.25], [0.5; 3]]);
+    assert_eq!(strip.depth, [f32::INFINITY, 1.0, 2.0]);
+}
+
+#[test]
 fn the_plate_hides_what_is_not_before_it() {
     let plate = [1.0_f32, 5.0];
     let mut strip = Strip::default();
@@ -93,4 +111,37 @@ fn a_picture_in_a_mirror_is_not_measured() {
     let mut view = View::new(CameraParameters::default(), Shutter { open: 0.0, close: 0.0 }, 0.0, [8, 8], 0);
     view.aovs_requested = true;
     assert!(!view.mirrored(0.0).aovs_requested);
+}
+
+#[test]
+fn a_camera_that_shakes_moves_although_it_ends_where_it_began() {
+    let keys = vec![(0.0, 0.0), (0.025, 2.0), (0.075, -2.0), (0.1, 0.0)];
+    let shaken = CameraParameters {
+        roll_deg: Animated::keyed(keys, Interpolation::Linear).unwrap(),
+        ..CameraParameters::default()
+    };
+    let view = View::new(shaken, Shutter { open: 0.0, close: 0.1 }, 0.0, [512, 512], 0);
+    assert!(view.motion_pixels() > 10.0, "{}", view.motion_pixels());
+    assert!(!view.path_cameras().is_still());
+}
+
+#[test]
+fn the_path_of_a_point_is_that_of_its_image() {
+    let keys = vec![(0.0, [-1.0, 1.0, 0.0]), (0.1, [1.0, 1.0, 0.0])];
+    let camera = CameraParameters {
+        position: Animated::from([0.0, 1.0, 10.0]),
+        target: Animated::from([0.0, 1.0, 0.0]),
+        ..CameraParameters::default()
+    };
+    let panned = CameraParameters { target: Animated::keyed(keys, Interpolation::Linear).unwrap(), ..camera.clone() };
+    let path = |camera: &CameraParameters, end: f64| {
+        let view = View::new(camera.clone(), Shutter { open: 0.0, close: 0.1 }, 0.0, [512, 512], 0);
+        let pixels = view.path_cameras().path_pixels(|t| DVec3::new(end * (t - 0.05) / 0.1, 1.0, 0.0));
+        pixels / view.camera.focal_pixels
+    };
+    // Radians: twice the arc tangent of a tenth.
+    assert!((path(&camera, 2.0) - 0.1993).abs() < 1e-3, "{}", path(&camera, 2.0));
+    assert!((path(&panned, 0.0) - 0.1993).abs() < 1e-3, "{}", path(&panned, 0.0));
+    assert!(path(&panned, 2.0) < 1e-3, "what the camera follows stands still: {}", path(&panned, 2.0));
+    assert_eq!([parts_of_motion(0.0, 1.0, 8), parts_of_motion(2.1, 1.0, 8), parts_of_motion(99.0, 1.0, 8)], [1, 3, 8]);
 }

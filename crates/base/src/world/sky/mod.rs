@@ -8,13 +8,12 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use crate::{
-    color::{black_body, luminance},
+    color::{self, black_body},
     math,
-    parameters::{Range, animated::Animated},
 };
 
 pub use elevations::{ElevationProfile, ElevationSample};
-pub use night::{Almucantar, EARTH_RADIUS_KM, Night, NightParameters};
+pub use night::{Almucantar, EARTH_RADIUS_KM, Night, SkyObserver, twilight_luminance};
 
 /// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). Below
 /// the horizon it is that of the horizon.
@@ -33,42 +32,6 @@ crate::choice! {
         Uniform = "uniform",
         /// Airglow, stars and twilight, as set in `night`.
         Night = "night",
-    }
-}
-
-crate::parameters! {
-    /// The sky behind everything. It lights the scene. In pictures with a plate, the plate is visible instead, and the sky through its alpha. A scene that states neither a
-    /// sky nor a light has a default sky if all its phenomena are of one kind that needs it: night for auroras, dusk for rain. A default sky is visible
-    /// unless the picture is transparent; a stated sky is always opaque.
-    pub struct SkyParameters {
-        /// Distribution of its luminance.
-        kind: SkyKind = SkyKind::Overcast;
-        /// Luminance overhead: 500 to 5000 on a rainy day, 1 at late dusk.
-        luminance: Animated<f64> = Animated::from(2000.0), limits(Range::new(0.0, 1e6)), unit("cd/m^2");
-        /// Color, as the temperature of a black body. Ignored at night, when each light source has its own color.
-        temperature_k: f64 = 7000.0, limits(Range::new(1000.0, 10_000.0)), unit("K");
-        /// Whether it is visible; otherwise it only lights the scene.
-        visible: bool = true;
-        /// Elevation of the hills all around, in front of the sky; 0 for none.
-        hills_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
-        /// Height of the trees on them; 0 for none.
-        trees_deg: f64 = 0.0, limits(Range::new(0.0, 30.0)), unit("degrees");
-        /// Distance of the hills and trees.
-        hills_distance: f64 = 8000.0, limits(Range::new(1.0, 1e5)), unit("m");
-        /// The sky at night.
-        night: NightParameters = NightParameters::default();
-    }
-}
-
-impl SkyParameters {
-    /// The sky at time `t`.
-    pub fn at(&self, t: f64) -> Sky {
-        if self.kind == SkyKind::Night {
-            return Sky::from_night(self.night.at(t));
-        }
-        let color = black_body().radiance(self.temperature_k as f32);
-        let scale = self.luminance.at(t) / f64::from(luminance(color)).max(f64::MIN_POSITIVE);
-        Sky { kind: self.kind, zenith: color.map(|value| (f64::from(value) * scale) as f32), ..Sky::DARK }
     }
 }
 
@@ -94,7 +57,17 @@ impl Sky {
         Self { zenith: profile.radiance(1.0), measured: Some(profile), ..Self::DARK }
     }
 
-    fn from_night(night: Night) -> Self {
+    /// A sky with this luminance overhead, cd/m^2, and the color of a black body at `temperature_k`. That of a night follows from [`Night`] instead.
+    #[must_use]
+    pub fn new(kind: SkyKind, luminance: f64, temperature_k: f64) -> Self {
+        let color = black_body().radiance(temperature_k as f32);
+        let scale = luminance / f64::from(color::luminance(color)).max(f64::MIN_POSITIVE);
+        Self { kind, zenith: color.map(|value| (f64::from(value) * scale) as f32), ..Self::DARK }
+    }
+
+    /// A sky at night.
+    #[must_use]
+    pub fn from_night(night: Night) -> Self {
         Self { kind: SkyKind::Night, zenith: night.radiance(DVec3::Y), night: Some(night), measured: None }
     }
 
@@ -177,10 +150,11 @@ fn overcast(sine: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math;
+    use crate::color::luminance;
 
     fn sky(kind: SkyKind) -> Sky {
-        SkyParameters { kind, luminance: Animated::from(900.0), ..SkyParameters::default() }.at(0.0)
+        let night = Night { airglow: 1.0, twilight: 0.0, sunward: -DVec3::Z, extinction: 0.22 };
+        if kind == SkyKind::Night { Sky::from_night(night) } else { Sky::new(kind, 900.0, 7000.0) }
     }
 
     #[test]
@@ -229,8 +203,8 @@ mod tests {
 
     #[test]
     fn a_warmer_sky_is_redder() {
-        let warm = SkyParameters { temperature_k: 3000.0, ..SkyParameters::default() }.at(0.0).radiance(DVec3::Y);
-        let cold = SkyParameters { temperature_k: 10_000.0, ..SkyParameters::default() }.at(0.0).radiance(DVec3::Y);
+        let warm = Sky::new(SkyKind::Overcast, 2000.0, 3000.0).radiance(DVec3::Y);
+        let cold = Sky::new(SkyKind::Overcast, 2000.0, 10_000.0).radiance(DVec3::Y);
         assert!(warm[0] / warm[2] > 2.0 * cold[0] / cold[2]);
         assert!(Sky::DARK.is_dark() && !sky(SkyKind::Overcast).is_dark());
     }

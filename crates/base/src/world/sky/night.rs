@@ -6,28 +6,7 @@ use super::air_mass;
 use crate::{
     color::{ACESCG_FROM_XYZ, LUMINOUS_EFFICACY_LM_PER_W, black_body, line_xyz, luminance},
     math,
-    parameters::{Range, animated::Animated},
 };
-
-const BRIGHTNESS_RANGE: Range = Range::new(0.0, 100.0);
-
-crate::parameters! {
-    /// The night sky, for `kind = "night"`. Its brightness is absolute, so the `luminance` of the sky is ignored.
-    pub struct NightParameters {
-        /// Elevation of the sun: below -18 there is no twilight, below -6 the brightest stars appear.
-        sun_elevation_deg: Animated<f64> = Animated::from(-30.0), limits(Range::new(-90.0, 0.0)), unit("degrees");
-        /// Azimuth of the sun, from north toward east.
-        sun_azimuth_deg: f64 = 0.0, limits(Range::new(-360.0, 360.0)), unit("degrees");
-        /// Brightness of the airglow relative to a typical night.
-        airglow: f64 = 1.0, limits(BRIGHTNESS_RANGE);
-        /// Brightness of the stars relative to the real sky; 0 for none.
-        stars: f64 = 1.0, limits(BRIGHTNESS_RANGE);
-        /// Brightness of the Milky Way relative to the real one.
-        milky_way: f64 = 1.0, limits(BRIGHTNESS_RANGE);
-        /// Atmospheric extinction overhead, magnitudes.
-        extinction: f64 = 0.22, limits(Range::new(0.0, 5.0)), unit("mag");
-    }
-}
 
 /// Lines of the airglow: wavelength in nm, brightness overhead in kR, altitude of the layer in km (Roach & Gordon 1973; Leinert et
 /// al. 1998). The last represents the visible hydroxyl bands.
@@ -46,32 +25,81 @@ pub const EARTH_RADIUS_KM: f64 = 6371.0;
 /// h c / (4 pi) for a kilorayleigh, W m^-2 sr^-1 nm.
 const KILORAYLEIGH: f64 = 1e13 / (4.0 * std::f64::consts::PI) * 6.626_070_15e-34 * 299_792_458.0 * 1e9;
 
+/// Altitude above which an observer sees noticeably below the horizontal and through less air, km.
+const LOW_KM: f64 = 1.0;
+/// Scale height of the air, km.
+const AIR_SCALE_HEIGHT_KM: f64 = 8.0;
+/// Thickness of the layers of the airglow, km: limits their brightness along the Earth's limb.
+const AIRGLOW_THICKNESS_KM: f64 = 10.0;
+
+/// How much of the sky an observer at an altitude sees: below it the Earth's horizon, above it the rest of the air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyObserver {
+    /// Height above the lowest kilometer, km.
+    height_km: f64,
+}
+
+impl SkyObserver {
+    /// An observer on the ground.
+    pub const ON_THE_GROUND: Self = Self { height_km: 0.0 };
+
+    /// The observer at a position in m, over a spherical Earth whose surface is at the height 0 of the world's origin.
+    #[must_use]
+    pub fn at(position: DVec3) -> Self {
+        let altitude_km = (position * 1e-3 + DVec3::Y * EARTH_RADIUS_KM).length() - EARTH_RADIUS_KM;
+        Self { height_km: (altitude_km - LOW_KM).max(0.0) }
+    }
+
+    /// Sine of the elevation of the Earth's horizon: 0 near the ground, negative from a height.
+    #[must_use]
+    pub fn horizon_sine(&self) -> f64 {
+        let cosine = EARTH_RADIUS_KM / (EARTH_RADIUS_KM + self.height_km);
+        -math::sqrt((1.0 - cosine * cosine).max(0.0))
+    }
+
+    /// Fraction of the air that is above.
+    fn air_above(&self) -> f64 {
+        math::exp(-self.height_km / AIR_SCALE_HEIGHT_KM)
+    }
+
+    /// Path length through a thin spherical layer at an elevation relative to the path straight through it. From above, a line of sight passes the
+    /// layer twice beside the Earth, and not at all farther up.
+    fn layer_path(&self, elevation: f64, altitude_km: f64) -> f64 {
+        if self.height_km == 0.0 {
+            return van_rhijn(elevation, altitude_km);
+        }
+        let layer = EARTH_RADIUS_KM + altitude_km;
+        let ratio = (EARTH_RADIUS_KM + self.height_km) / layer * math::cos(elevation);
+        let is_above = self.height_km > altitude_km;
+        if ratio >= 1.0 || (is_above && elevation >= 0.0) {
+            return 0.0;
+        }
+        let crossings = if is_above { 2.0 } else { 1.0 };
+        crossings / math::sqrt((1.0 - ratio * ratio).max(AIRGLOW_THICKNESS_KM / layer))
+    }
+}
+
 /// The night sky at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Night {
-    airglow: f64,
-    /// Luminance of the twilight overhead, cd/m^2.
-    twilight: f64,
+    /// Brightness of the airglow relative to a typical night.
+    pub airglow: f64,
+    /// Luminance of the twilight overhead, cd/m^2: see [`twilight_luminance`].
+    pub twilight: f64,
     /// Horizontal unit vector toward the azimuth of the sun.
-    sunward: DVec3,
-    extinction: f64,
+    pub sunward: DVec3,
+    /// Atmospheric extinction overhead, magnitudes.
+    pub extinction: f64,
 }
 
-impl NightParameters {
-    /// The night sky at time `t`.
-    pub(super) fn at(&self, t: f64) -> Night {
-        let depression = -self.sun_elevation_deg.at(t) / 3.0;
-        let last_index = TWILIGHT.len() - 1;
-        let interval = (depression as usize).min(last_index - 1);
-        let log = math::lerp(TWILIGHT[interval], TWILIGHT[interval + 1], depression - interval as f64);
-        let (east, north) = math::sin_cos(self.sun_azimuth_deg.to_radians());
-        Night {
-            airglow: self.airglow,
-            twilight: if depression < last_index as f64 + 1.0 { math::pow(10.0, log) } else { 0.0 },
-            sunward: DVec3::new(east, 0.0, -north),
-            extinction: self.extinction,
-        }
-    }
+/// Luminance of the twilight overhead, cd/m^2, at an elevation of the sun in degrees, 0 or below (Koomen et al. 1952).
+#[must_use]
+pub fn twilight_luminance(sun_elevation_deg: f64) -> f64 {
+    let depression = -sun_elevation_deg / 3.0;
+    let last_index = TWILIGHT.len() - 1;
+    let interval = (depression as usize).min(last_index - 1);
+    let log = math::lerp(TWILIGHT[interval], TWILIGHT[interval + 1], depression - interval as f64);
+    if depression < last_index as f64 + 1.0 { math::pow(10.0, log) } else { 0.0 }
 }
 
 /// The night sky along an almucantar, a circle of constant elevation.
@@ -127,20 +155,33 @@ impl Night {
         math::pow(10.0, -0.4 * self.extinction * air_mass(elevation))
     }
 
-    /// The almucantar of an elevation in radians.
+    /// The same night for an observer at a height: with the air and the twilight that are left above.
     #[must_use]
-    pub fn almucantar(&self, elevation: f64) -> Almucantar {
+    pub fn above(&self, observer: SkyObserver) -> Self {
+        let air = observer.air_above();
+        Self { extinction: self.extinction * air, twilight: self.twilight * air, ..*self }
+    }
+
+    /// The almucantar of an elevation in radians, seen from the ground.
+    fn almucantar(&self, elevation: f64) -> Almucantar {
+        self.almucantar_of(elevation, SkyObserver::ON_THE_GROUND)
+    }
+
+    /// The almucantar of an elevation in radians for an observer whose air is that of [`above`](Self::above).
+    #[must_use]
+    pub fn almucantar_of(&self, elevation: f64, observer: SkyObserver) -> Almucantar {
         let overhead = self.transmittance(std::f64::consts::FRAC_PI_2);
         // Scattering replaces 30 % of the light lost by extinction.
         let diffuse = 0.3 + 0.7 * self.transmittance(elevation) / overhead.max(f64::MIN_POSITIVE);
         let mut uniform = blackbody_light(BACKGROUND_K, BACKGROUND * diffuse);
         for (wavelength_nm, kilorayleigh, altitude_km) in AIRGLOW {
             let scale = LUMINOUS_EFFICACY_LM_PER_W * KILORAYLEIGH / wavelength_nm;
-            let brightness = self.airglow * kilorayleigh * van_rhijn(elevation, altitude_km) * diffuse * scale;
+            let brightness =
+                self.airglow * kilorayleigh * observer.layer_path(elevation, altitude_km) * diffuse * scale;
             uniform += DVec3::from(ACESCG_FROM_XYZ.apply(line_xyz(wavelength_nm))) * brightness;
         }
         // Twilight: blue overhead, brighter and yellow low above the sun.
-        let low = math::exp(-elevation / TWILIGHT_ARCH);
+        let low = math::exp(-elevation.max(0.0) / TWILIGHT_ARCH);
         let blue = blackbody_light(10_000.0, self.twilight);
         let single = |color: DVec3| color.to_array().map(|value| value as f32);
         Almucantar {
@@ -168,14 +209,19 @@ fn blackbody_light(temperature_k: f32, brightness: f64) -> DVec3 {
 mod tests {
     use super::*;
 
-    fn overhead(parameters: &NightParameters) -> f64 {
-        f64::from(luminance(parameters.at(0.0).radiance(DVec3::Y)))
+    /// A typical night, with the sun in the north.
+    fn night(sun_elevation_deg: f64) -> Night {
+        Night { airglow: 1.0, twilight: twilight_luminance(sun_elevation_deg), sunward: -DVec3::Z, extinction: 0.22 }
+    }
+
+    fn overhead(night: &Night) -> f64 {
+        f64::from(luminance(night.radiance(DVec3::Y)))
     }
 
     #[test]
     fn a_dark_night_has_about_22_magnitudes_per_square_second() {
         // 21.6 to 22 mag/arcsec^2 at good sites: 1.7e-4 to 2.5e-4 cd/m^2.
-        let dark = overhead(&NightParameters::default());
+        let dark = overhead(&night(-30.0));
         assert!((1.6e-4..2.6e-4).contains(&dark), "{dark}");
     }
 
@@ -184,18 +230,34 @@ mod tests {
         // Roach & Meinel (1955): 100 km, zenith distance 80 degrees: 3.9.
         assert!((van_rhijn(10_f64.to_radians(), 100.0) - 4.0).abs() < 0.2);
         assert_eq!(van_rhijn(std::f64::consts::FRAC_PI_2, 100.0), 1.0);
-        let night = NightParameters::default().at(0.0);
+        let night = night(-30.0);
         let low = DVec3::new(0.97, 0.24, 0.0).normalize();
         assert!(luminance(night.radiance(low)) > 1.1 * luminance(night.radiance(DVec3::Y)));
     }
 
     #[test]
+    fn from_orbit_the_airglow_is_an_arc_along_the_limb() {
+        let observer = SkyObserver::at(DVec3::Y * 401e3);
+        // The horizon is where the line of sight touches the Earth: cos = R / (R + h).
+        assert!((math::asin(observer.horizon_sine()) + math::acos(6371.0 / 6771.0)).abs() < 1e-12);
+        let night = night(-30.0).above(observer);
+        let at = |tangent_km: f64| {
+            let elevation = -math::acos((EARTH_RADIUS_KM + tangent_km) / (EARTH_RADIUS_KM + 400.0));
+            luminance(night.almucantar_of(elevation, observer).terms()[0])
+        };
+        let (space, arc, below) = (at(300.0), at(86.0), at(20.0));
+        assert!(arc > 2.0 * below && below > 2.0 * space, "{space} {arc} {below}");
+        // Near the ground nothing changes.
+        let ground = SkyObserver::at(DVec3::Y * 900.0);
+        assert_eq!(ground.horizon_sine(), 0.0);
+        assert_eq!(self::night(-30.0).above(ground), self::night(-30.0));
+    }
+
+    #[test]
     fn twilight_falls_a_thousandfold_from_6_to_12_degrees_and_lies_over_the_sun() {
-        let at =
-            |degrees: f64| NightParameters { sun_elevation_deg: Animated::from(degrees), ..NightParameters::default() };
-        let ratio = overhead(&at(-6.0)) / overhead(&at(-12.0));
+        let ratio = overhead(&night(-6.0)) / overhead(&night(-12.0));
         assert!((200.0..1500.0).contains(&ratio), "{ratio}");
-        let night = at(-9.0).at(0.0);
+        let night = night(-9.0);
         let seen = |z: f64| luminance(night.radiance(DVec3::new(0.0, 0.1, z).normalize()));
         assert!(seen(-1.0) > 2.0 * seen(1.0));
     }

@@ -169,10 +169,15 @@ impl Wind {
         gusty.then_some(self.parameters.gust_length)
     }
 
+    /// Standard deviation of each horizontal component of gusts at time `t`, m/s.
+    pub fn gust_deviation(&self, t: f64) -> f64 {
+        if self.gusts.is_none() { 0.0 } else { self.gust(t) * self.mean(t).length() }
+    }
+
     /// Velocity at a point at time `t`, including gusts, m/s.
     pub fn at(&self, point: DVec3, t: f64) -> DVec3 {
         let mean = self.mean(t);
-        let strength = self.gust(t) * mean.length();
+        let strength = self.gust_deviation(t);
         let Some(gusts) = self.gusts.as_ref().filter(|_| strength > 0.0) else { return mean };
         let WindParameters { gust_length, gust_period_s, .. } = &self.parameters;
         let (drift, noise_time) = match self.loop_s {

@@ -1,12 +1,9 @@
 //! `bansho farm snapshots`, `bansho farm tile`, `bansho farm check`: what the steps of a template run, which has no plan.
 
-use std::fs;
-
 use bansho::{
     base::host::plural::counted,
     farm::{FarmError, FarmFolder, chunks::ChunkGrid, machine, status, task},
     job::Job,
-    media::files::atomic,
 };
 
 use super::{run_in_pool, task::wait_for};
@@ -59,9 +56,7 @@ pub(crate) fn check(args: &CheckMachineArgs) -> anyhow::Result<()> {
         machine::check_bytes(&args.made_by, &args.arithmetic, reporter)?;
         let token = folder.template_token();
         if args.leave_token {
-            let path = folder.root().to_path_buf();
-            fs::create_dir_all(&path).map_err(|source| FarmError::Io { path, source })?;
-            atomic::write_bytes(&token, format!("{}\n", args.token).as_bytes())?;
+            folder.write_template_token(&args.token)?;
         }
         wait_for(|| machine::check_token(token.clone(), &args.token))?;
         Ok(None)

@@ -4,7 +4,7 @@ use std::{io, path::Path, time::Instant};
 
 use bansho::{
     Observer, Stage, StagePart,
-    farm::journal::{Event, Journal},
+    farm::journal::{Journal, JournalEvent},
     job::{FrameDone, JobObserver, JobStarted, Warning},
 };
 
@@ -39,7 +39,7 @@ impl TaskJournal {
         self.since.elapsed().as_secs_f64()
     }
 
-    fn write(&self, event: &Event) {
+    fn write(&self, event: &JournalEvent) {
         if let Some(Err(error)) = self.journal.as_ref().map(|journal| journal.write(event)) {
             warn(&error);
         }
@@ -48,11 +48,11 @@ impl TaskJournal {
     /// The task begins. Once more where the numbers of frames are known.
     pub(super) fn start(&self, frames: usize, kept: usize) {
         let (node, token) = (self.node.clone(), self.token.clone());
-        self.write(&Event::Start { node, token, frames, kept, threads: self.threads });
+        self.write(&JournalEvent::Start { node, token, frames, kept, threads: self.threads });
     }
 
     pub(super) fn end(&self, code: u8, message: Option<String>) {
-        self.write(&Event::End { code, message, seconds: self.seconds(), cpu_seconds: stats::cpu_seconds() });
+        self.write(&JournalEvent::End { code, message, seconds: self.seconds(), cpu_seconds: stats::cpu_seconds() });
     }
 }
 
@@ -95,7 +95,7 @@ impl JobObserver for JournalObserver<'_> {
     }
 
     fn frame_done(&self, frame: &FrameDone) {
-        self.journal.write(&Event::Frame { number: frame.number, seconds: self.journal.seconds() });
+        self.journal.write(&JournalEvent::Frame { number: frame.number, seconds: self.journal.seconds() });
         self.reporter.frame_done(frame);
     }
 

@@ -54,7 +54,7 @@ fn run_in_pool(
     work: impl FnOnce(&ProgressReporter) -> Result<Option<JobResult>, FarmError> + Send,
 ) -> anyhow::Result<()> {
     interrupt::set_grace_period(reporter.forced_exit_message());
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, usize::from)).build()?;
+    let pool = super::thread_pool(threads)?;
     match pool.install(|| work(&reporter)) {
         Ok(Some(result)) => reporter.finish(Ok(result), pool.current_num_threads()),
         Ok(None) => Ok(()),

@@ -1,9 +1,6 @@
 //! `bansho farm openjd`
 
-use std::{
-    fs,
-    path::{self, Path},
-};
+use std::path::{self, Path};
 
 use bansho::{
     Unobserved,
@@ -14,16 +11,13 @@ use bansho::{
         task::{self, sequence_name},
     },
     job::{Job, frames},
-    media::{
-        MediaError,
-        files::{atomic, provenance::PROGRAM},
-    },
+    media::files::{atomic, naming, provenance::PROGRAM},
 };
 
 use super::{arguments, random_token};
 use crate::{
     args::{Frames, OpenjdArgs},
-    output::print,
+    output::{print, shell_word},
 };
 
 /// Writes the template.
@@ -55,19 +49,11 @@ pub(crate) fn run(args: &OpenjdArgs) -> anyhow::Result<()> {
         memory_bytes,
         finish_memory_bytes: flipbook.map_or(0.0, |flipbook| flipbook.memory_bytes()).max(prepared.memory_bytes()),
     })?;
-    check_replaceable(&args.out)?;
-    atomic::write_bytes(&args.out, template.as_bytes())?;
-    Ok(print(&format!("{}: written. Run it here: openjd run {0}\n", printable(&args.out.display().to_string())))?)
-}
-
-/// Only a template is replaced.
-fn check_replaceable(path: &Path) -> Result<(), MediaError> {
-    match fs::read(path) {
-        Ok(existing) if !existing.starts_with(b"specificationVersion: ") => {
-            Err(MediaError::AlreadyExists { path: path.to_path_buf() })
-        }
-        _ => Ok(()),
-    }
+    // Options of the tasks are not of this file.
+    let policy = prepared.overwrite_policy().clone().without_foreign_files();
+    atomic::write_bytes(&args.out, template.as_bytes(), &policy)?;
+    let shown = args.out.display().to_string();
+    Ok(print(&format!("{}: written. Run it here: openjd run {}\n", printable(&shown), shell_word(&args.out)))?)
 }
 
 /// The job of all frames, with the options that follow `--`.
@@ -83,7 +69,7 @@ fn job(args: &OpenjdArgs) -> anyhow::Result<Job> {
         frames: args.frames.clone().map(|Frames(numbers)| numbers),
         size: args.size,
         snapshots: None,
-        out: Some(args.frame_name.clone().unwrap_or_else(|| format!("{stem}.####.png")).into()),
+        out: Some(args.frame_name.clone().unwrap_or_else(|| naming::default_sequence(&stem)).into()),
         resume: true,
         ..job
     })

@@ -18,14 +18,14 @@ use bansho::{
         FarmError, FarmFolder, FarmPlan,
         chunks::{self, ChunkGrid, ChunkRequest, ShotCosts},
         film, machine,
-        plan::PlanOptions,
+        plan::FarmPlanOptions,
         probe::{self, ProbeObserver},
         products::Products,
         slurm::{self, SlurmOptions},
         space, status, task,
     },
     job::{Job, PreparedJob},
-    media::files::atomic,
+    media::files::overwrite_policy::OverwritePolicy,
 };
 
 use super::{
@@ -36,7 +36,7 @@ use super::{
 use crate::{
     args::{ChunkLength, SlurmArgs},
     exit::{ReportedError, UsageError},
-    output::{print, print_error_lines},
+    output::{print, print_foreign_lines, shell_word},
     progress::ProgressReporter,
 };
 
@@ -73,7 +73,9 @@ pub(crate) fn run(args: &SlurmArgs) -> anyhow::Result<()> {
     match (planned.is_complete, args.submit) {
         (true, _) => Ok(()),
         (false, true) => submit(&planning.folder),
-        (false, false) => Ok(print(&format!("submit: sh {}\n", shown(&planning.folder.root().join("submit.sh"))))?),
+        (false, false) => {
+            Ok(print(&format!("submit: sh {}\n", shell_word(&planning.folder.root().join("submit.sh"))))?)
+        }
     }
 }
 
@@ -100,7 +102,7 @@ fn check_slurm(args: &SlurmArgs) -> anyhow::Result<()> {
         Err(error) => Err(anyhow::Error::from(error).context("sbatch")),
         Ok(output) if output.status.success() => Ok(()),
         Ok(output) => {
-            print_error_lines(String::from_utf8_lossy(&output.stderr).trim_end());
+            print_foreign_lines(&output.stderr);
             Err(ReportedError::OtherProgram.into())
         }
     }
@@ -114,7 +116,7 @@ fn check_no_active_jobs(folder: &FarmFolder, is_needed: bool) -> anyhow::Result<
         Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).into_owned(),
         _ if !is_needed => return Ok(()),
         Ok(output) => {
-            print_error_lines(String::from_utf8_lossy(&output.stderr).trim_end());
+            print_foreign_lines(&output.stderr);
             return Err(ReportedError::OtherProgram.into());
         }
         Err(error) => return Err(anyhow::Error::from(error).context("squeue")),
@@ -173,6 +175,7 @@ impl Planning<'_> {
     fn plan(&self, reporter: &ProgressReporter) -> Result<Planned, FarmError> {
         let tiled = task::tile_job(&self.job, &self.folder, self.args.tiles, self.request().tiles / 2)?;
         let prepared = tiled.prepare()?;
+        self.folder.check_files(prepared.overwrite_policy())?;
         let flipbook = film::check(&self.products, &self.job, &self.current)?;
         let memory_bytes = prepared.memory_bytes();
         let finish_memory_bytes = flipbook.map_or(0.0, |flipbook| flipbook.memory_bytes()).max(memory_bytes);
@@ -192,11 +195,11 @@ impl Planning<'_> {
         let digests = (0..grid.count()).map(|chunk| prepared.shot_digest(grid.chunk(chunk))).collect();
         let options = self.options(prepared.is_stepped() && grid.last_snapshot().is_some(), costs)?;
         let plan = FarmPlan::new(options, &grid, first_frame, chunk_frames, digests);
-        self.write(&plan, &grid, [memory_bytes, finish_memory_bytes])
+        self.write(&plan, &grid, [memory_bytes, finish_memory_bytes], prepared.overwrite_policy())
     }
 
-    fn options(&self, snapshots: bool, costs: ShotCosts) -> Result<PlanOptions, FarmError> {
-        Ok(PlanOptions {
+    fn options(&self, snapshots: bool, costs: ShotCosts) -> Result<FarmPlanOptions, FarmError> {
+        Ok(FarmPlanOptions {
             token: random_token(),
             arithmetic: machine::arithmetic_digest(&Unobserved)?,
             folder: self.current.clone(),
@@ -243,7 +246,13 @@ impl Planning<'_> {
     }
 
     /// Writes the plan and its scripts. `memory_bytes` are of a task and of the last job.
-    fn write(&self, plan: &FarmPlan, grid: &ChunkGrid, memory_bytes: [f64; 2]) -> Result<Planned, FarmError> {
+    fn write(
+        &self,
+        plan: &FarmPlan,
+        grid: &ChunkGrid,
+        memory_bytes: [f64; 2],
+        policy: &OverwritePolicy,
+    ) -> Result<Planned, FarmError> {
         let states = status::task_states(&self.job, &self.folder, plan)?;
         let missing = |task: &usize| status::FrameCounts::of(&states[*task]).unfinished();
         let tasks: Vec<usize> = (0..states.len()).filter(|task| missing(task) > 0).collect();
@@ -255,12 +264,12 @@ impl Planning<'_> {
         let is_complete = tasks.is_empty() && self.is_finished(plan)?;
         if !is_complete {
             // Before anything may fail, so that nothing is measured twice.
-            self.folder.write_plan(plan)?;
+            self.folder.write_plan(plan, policy)?;
             let required = space::required_bytes(&plan.costs, frames as u64, snapshots);
             space::check(self.folder.root(), required, available_bytes(self.folder.root()))?;
             let options = self.slurm_options(memory_bytes)?;
             for script in slurm::scripts(plan, &self.folder, &tasks, last_snapshot, &options)? {
-                atomic::write_bytes(&self.folder.root().join(script.name), script.text.as_bytes())?;
+                self.folder.write_script(&script, policy)?;
             }
         }
         let summary = summary(plan, tasks.len(), frames, last_snapshot.is_some(), &self.folder);

@@ -3,9 +3,12 @@
 use std::{env, fmt::Write, path};
 
 use bansho::{
-    base::host::{plural::counted, printable::printable},
+    base::host::{
+        plural::counted,
+        printable::{printable, printable_excerpt},
+    },
     farm::{
-        FarmFolder,
+        FarmError, FarmFolder,
         status::{self, FarmStatus, FinishStatus, TaskState, TaskStatus},
         task,
     },
@@ -14,19 +17,23 @@ use bansho::{
 use serde_json::{Value, json};
 
 use super::{arguments, queue};
-use crate::{args::FarmStatusArgs, exit::ReportedError, output::print};
+use crate::{
+    args::FarmStatusArgs,
+    exit::ReportedError,
+    output::{json_text, print},
+};
 
 /// Prints the state of a plan. It is an error if not all is whole, though one without a message.
 pub(crate) fn run(args: &FarmStatusArgs) -> anyhow::Result<()> {
     let named = Job { out: args.out.clone(), ..Job::new(SceneFile::read(&args.scene)?) };
     let folder = FarmFolder::new(path::absolute(FarmFolder::beside(&task::sequence_name(&named)?).root())?);
     let plan = folder.read_plan()?;
-    env::set_current_dir(&plan.folder)?;
+    env::set_current_dir(&plan.folder).map_err(|source| FarmError::Io { path: plan.folder.clone(), source })?;
     let job = arguments::render_job(&plan.arguments)?;
     // Before the journals are read: what ends in between has written so.
     let queue = queue::queue(&folder);
     let status = status::status(&job, &folder, &plan, queue.as_ref())?;
-    print(&if args.json { format!("{}\n", as_json(&status)) } else { as_text(&status) })?;
+    print(&if args.json { format!("{}\n", json_text(&as_json(&status))) } else { as_text(&status) })?;
     if status.is_complete() { Ok(()) } else { Err(ReportedError::Incomplete.into()) }
 }
 
@@ -52,7 +59,9 @@ fn as_text(status: &FarmStatus) -> String {
             writeln!(text, "last job: done, but {} is missing", printable(&path.display().to_string()))
         }
         (FinishStatus::Done, _) => writeln!(text, "last job: done"),
-        (FinishStatus::Failed { message }, _) => writeln!(text, "last job: failed: {message}"),
+        (FinishStatus::Failed { message }, _) => {
+            writeln!(text, "last job: failed: {}", printable_excerpt(message))
+        }
         (FinishStatus::Waiting, _) => writeln!(text, "last job: waits for the others"),
         (FinishStatus::Lost, _) => {
             writeln!(
@@ -61,7 +70,9 @@ fn as_text(status: &FarmStatus) -> String {
             )
         }
         (FinishStatus::Blocked { by }, _) => {
-            let causes: Vec<String> = by.iter().map(|(name, why)| format!("{name} ({why})")).collect();
+            let cause =
+                |(name, why): &(String, String)| format!("{} ({})", printable_excerpt(name), printable_excerpt(why));
+            let causes: Vec<String> = by.iter().map(cause).collect();
             writeln!(text, "last job: did not run, because others failed: {}", causes.join("; "))
         }
     };
@@ -75,7 +86,10 @@ fn as_text(status: &FarmStatus) -> String {
 fn task_line(task: &TaskStatus, asked: bool) -> String {
     let counts = &task.frames;
     let last = task.attempts.last();
-    let on_node = last.map(|last| format!(" on {}, {} drawn there", last.node, counted(last.drawn, "frame")));
+    let on_node = last.map(|last| {
+        let node = printable_excerpt(&last.node);
+        format!(" on {node}, {} drawn there", counted(last.drawn, "frame"))
+    });
     let on_node = on_node.unwrap_or_default();
     let state = match (task.state, last.and_then(|last| last.code)) {
         (TaskState::Done, _) => "done".to_owned(),

@@ -40,7 +40,7 @@ pub(crate) fn run(args: &TaskArgs) -> anyhow::Result<()> {
     let done = work(args.task, &folder, &check, threads, &journal);
     match &done {
         Ok(()) => journal.end(0, None),
-        Err(error) => journal.end(exit::code(error), Some(format!("{error:#}"))),
+        Err(error) => journal.end(exit::code(error), Some(exit::message(error))),
     }
     done
 }

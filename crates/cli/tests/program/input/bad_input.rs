@@ -108,8 +108,11 @@ fn text_that_is_no_toml_is_located() {
 }
 
 #[test]
-fn a_newer_format_is_refused() {
-    says(&refused("bansho = 99\n", 3), &["scene.toml:1:10: ", "99", "known: up to 2"]);
+fn any_other_format_is_refused() {
+    for format in [1, 99] {
+        let found = format!("format {format} cannot be read by this version; allowed: 2");
+        says(&refused(&format!("bansho = {format}\n"), 3), &["scene.toml:1:10: ", &found]);
+    }
 }
 
 #[test]
@@ -294,6 +297,64 @@ fn a_plate_that_is_damaged_on_the_way_is_told_with_its_line() {
     let run = folder.run(&["render", "laid.toml", "--out", "f.png"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
     says(&run.stderr, &["laid.toml:15:9: plate.image: ", "plate.0002.png: is damaged"]);
+}
+
+#[test]
+fn frames_of_a_plate_are_checked_whole_and_of_one_size_before_anything_is_drawn() {
+    let folder = with_plates("0-5");
+    let whole = std::fs::read(folder.path("plate.0004.png")).unwrap();
+    std::fs::write(folder.path("plate.0004.png"), &whole[..whole.len() - 20]).unwrap();
+    for arguments in
+        [&["check", "laid.toml"][..], &["render", "laid.toml"], &["flipbook", "laid.toml", "--grid", "2x3"]]
+    {
+        let run = folder.run(arguments);
+        assert_eq!((run.code, run.errors()), (Some(3), 1), "{arguments:?}: {}", run.stderr);
+        says(
+            &run.stderr,
+            &["laid.toml:15:9: plate.image: ", "plate.0004.png: is damaged", "truncated; it is the plate of frame 4"],
+        );
+        assert!(!folder.path("out").exists());
+    }
+    folder.succeed(&[
+        "render",
+        "scene.toml",
+        "--frames",
+        "4",
+        "--size",
+        "24x32",
+        "--overwrite",
+        "--out",
+        "plate.0004.png",
+    ]);
+    let run = folder.run(&["check", "laid.toml"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    says(&run.stderr, &["frame 4 has 24 x 32 pixels, and that of frame 0 48 x 64; allowed: one size"]);
+}
+
+#[test]
+fn a_file_that_a_change_names_is_the_one_that_is_missing() {
+    let folder = Folder::with_scene(&format!("{FLAME}[plate]\nimage = \"gone.png\"\n"));
+    let told = |change: &str| {
+        let run = folder.run(&["render", "scene.toml", "--set", change]);
+        // A wrong use of the program, or where the change names no file a wrong scene.
+        let code = if change.contains("image") || change.contains("mesh") { 2 } else { 3 };
+        assert_eq!((run.code, run.errors()), (Some(code), 1), "{}", run.stderr);
+        run.stderr
+    };
+    let wrong = told("plate.image=\"nosuch.png\"");
+    assert!(wrong.contains("nosuch.png: no such file") && !wrong.contains("gone.png"), "{wrong}");
+    // A change elsewhere leaves the file's own problem.
+    let own = told("picture.frames=2");
+    says(&own, &["scene.toml:15:9: plate.image: ", "gone.png: no such file"]);
+    let folder = Folder::with_scene(&format!("{FLAME}[[obstacle]]\nshape = \"mesh\"\nfile = \"gone.glb\"\n"));
+    let run = folder.run(&["render", "scene.toml", "--set", "obstacle.file=\"nosuch.glb\""]);
+    assert!(run.stderr.contains("nosuch.glb: no such file") && !run.stderr.contains("gone.glb"), "{}", run.stderr);
+}
+
+#[test]
+fn whole_numbers_are_written_as_such_everywhere() {
+    let error = refused(&FLAME.replace("size = [48, 64]", "size = [48.0, 64]"), 3);
+    says(&error, &["picture.size", "expected a whole number", "found a number"]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::{
     process::{Child, Stdio},
 };
 
-use crate::support::{FLAME, Folder, Run};
+use crate::support::{FLAME, Folder, Run, decode_png, read_exr};
 
 /// A scene over the plate `name`.
 fn over(name: &str) -> String {
@@ -121,4 +121,66 @@ fn a_root_confines_all_that_a_scene_names() {
     }
     let run = folder.run(&["check", "job/own.toml", "--asset-root", "gone"]);
     assert_eq!(run.code, Some(2), "{}", run.stderr);
+}
+
+/// A float map of 48 x 64 values, such as one made by an estimator of depth.
+fn float_map(value: impl Fn(usize) -> f32) -> Vec<u8> {
+    let values = (0..48 * 64).flat_map(|index| value(index % 48).to_le_bytes());
+    [b"Pf\n48 64\n-1.0\n".to_vec(), values.collect()].concat()
+}
+
+#[test]
+fn a_depth_that_hides_nothing_is_told_and_negative_z_hides_as_the_distance_does() {
+    let folder = Folder::new();
+    folder.write("flat.toml", "bansho = 2\n[picture]\nsize = [48, 64]\nframes = 1\n[sky]\nkind = \"uniform\"\n");
+    folder.succeed(&["render", "flat.toml", "-o", "flat.png"]);
+    // The flame is about 3 m away.
+    let left = |near: f32, far: f32| move |column: usize| if column < 24 { near } else { far };
+    let picture = |name: &str, map: Vec<u8>| {
+        fs::write(folder.path("depth.pfm"), map).unwrap();
+        folder.write("scene.toml", &format!("{}depth = \"depth.pfm\"\nexposure_ev100 = 8\n", over("flat.png")));
+        let out = format!("{name}.png");
+        let run = folder.succeed(&["render", "scene.toml", "--frames", "3", "-o", &out]);
+        let checked = folder.succeed(&["check", "scene.toml"]);
+        (decode_png(&fs::read(folder.path(&out)).unwrap()).bytes, [run.stderr, checked.stdout, checked.stderr].concat())
+    };
+    let (distance, told) = picture("distance", float_map(left(2.0, 100.0)));
+    assert!(!told.contains("the depth"), "{told}");
+    let (negative, told) = picture("negative", float_map(left(-2.0, -100.0)));
+    assert!(told.contains("the depth is negative, as z of a camera that looks toward -z"), "{told}");
+    assert!(distance == negative, "the same picture");
+    let (open, told) = picture("zero", float_map(left(0.0, 0.0)));
+    assert!(told.contains("hides nothing, since none of its 3072 values is a depth: all are 0"), "{told}");
+    assert!(open != distance, "the left half of the flame is hidden");
+    for (value, words) in
+        [(f32::NAN, "all are not a number"), (f32::INFINITY, "all are infinite"), (1e30, "farther than")]
+    {
+        let (other, told) = picture("other", float_map(left(value, value)));
+        assert!(told.contains(words) && other == open, "{value}: {told}");
+    }
+    let (mixed, told) = picture("mixed", float_map(left(2.0, -1.0)));
+    assert!(told.contains("1536 of its 3072 values are negative") && mixed == distance, "{told}");
+}
+
+#[test]
+fn raw_light_comes_back_as_a_plate_and_films_refuse_it() {
+    let folder = Folder::new();
+    let scene = "bansho = 2\n[picture]\nsize = [32, 18]\nframes = 1\nexposure_ev100 = 8\n";
+    let sky = "[sky]\nluminance = 70\nkind = \"uniform\"\ntemperature_k = 3000\n";
+    folder.write("sky.toml", &format!("{scene}{sky}"));
+    folder.write("back.toml", &format!("{scene}[plate]\nimage = \"raw.png\"\nexposure_ev100 = 8\n"));
+    folder.succeed(&["render", "sky.toml", "-o", "sky.exr"]);
+    let light = read_exr(&folder.path("sky.exr")).channels["R"][0];
+    assert!((0.05..0.95).contains(&light), "{light}");
+    for (bits, tolerance) in [("8", 1.01 / 255.0), ("16", 1e-3)] {
+        folder.succeed(&["render", "sky.toml", "--view", "raw", "--bits", bits, "-o", "raw.png"]);
+        folder.succeed(&["render", "back.toml", "-o", "back.exr"]);
+        let back = read_exr(&folder.path("back.exr")).channels["R"][0];
+        assert!((back - light).abs() < tolerance, "{bits} bits: {light} became {back}");
+    }
+    for film in ["a.gif", "a.mp4", "a.mov", "a.webm"] {
+        let run = folder.run(&["render", "sky.toml", "--view", "raw", "-o", film]);
+        assert_eq!((run.code, run.errors()), (Some(2), 1), "{film}: {}", run.stderr);
+        assert!(run.stderr.contains("--view: the view `raw` is linear light in ACEScg, which a."), "{}", run.stderr);
+    }
 }

@@ -2,6 +2,7 @@
 
 mod alpha;
 mod flipbook;
+mod foreign_files;
 mod metadata;
 mod overwriting;
 mod pictures;

@@ -140,7 +140,7 @@ fn frames_beyond_the_scene_are_drawn_with_a_warning() {
     let warnings: Vec<&str> = run.stderr.lines().filter(|line| line.starts_with("warning: ")).collect();
     assert_eq!(warnings.len(), 1, "{}", run.stderr);
     assert!(warnings[0].contains("2 frames are outside the scene's range, 0 to 5"), "{}", run.stderr);
-    assert_eq!(folder.names(), ["f.-0003.png", "f.0002.png", "f.0007.png", "scene.toml"]);
+    assert_eq!(folder.names(), ["f.-003.png", "f.0002.png", "f.0007.png", "scene.toml"]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use bansho::aurora::{
     SpectrumShape,
     physics::{
         atmosphere::{LEVEL_SPACING, LEVELS, atmosphere, level_altitude_km},
-        emission::{Emission, Emitter, PHOTONS_PER_KILORAYLEIGH},
+        emission::{Emission, PHOTONS_PER_KILORAYLEIGH, SpectralEmitter},
     },
 };
 
@@ -163,9 +163,11 @@ fn a_sheet_at_the_zenith_has_the_kilorayleighs_of_its_column() {
     let emission = Emission::new(atmosphere(), SpectrumShape::Gaussian.spectrum());
     // An altitude z contributes flux x thickness x emission / z, integrated over the directions across the sheet by the tangent of their angle.
     let tangents = bansho::base::math::tan(f64::to_radians(15.0)) / 32.0;
-    for (line, emitter, photons) in
-        [("557", Emitter::OxygenGreen, 1.0), ("427", Emitter::NitrogenIon, 1.0), ("391", Emitter::NitrogenIon, 3.28)]
-    {
+    for (line, emitter, photons) in [
+        ("557", SpectralEmitter::OxygenGreen, 1.0),
+        ("427", SpectralEmitter::NitrogenIon, 1.0),
+        ("391", SpectralEmitter::NitrogenIon, 3.28),
+    ] {
         let at = |level: usize| {
             let altitude_km = level_altitude_km(level);
             emission.at(5000.0, altitude_km)[emitter.index()] * photons / altitude_km

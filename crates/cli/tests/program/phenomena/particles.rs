@@ -105,7 +105,7 @@ fn what_has_no_particles_or_no_such_name_is_refused_before_anything_is_written()
 }
 
 #[test]
-fn a_simulated_loop_is_one_turn_and_refuses_fuel_that_jumps() {
+fn a_simulated_loop_is_one_period_and_refuses_fuel_that_jumps() {
     let folder = Folder::with_scene(GAS);
     folder.succeed(&["render", "scene.toml", "--loop", "0.2", "-o", "turn/f.####.png"]);
     assert_eq!(folder.files("turn").len(), 6);

@@ -2,15 +2,15 @@
 
 use bansho_base::{
     image::Rect,
-    phenomenon::strip::{AovDescriptor, AovRule, Strip, View},
+    phenomenon::strip::{AovDescriptor, AovRule, Strip},
 };
 
-use super::gas::Gas;
+use super::{gas::Gas, gas_view::GasView};
 use crate::particles::{
-    parameters::RenderingParameters,
+    parameters::GasRenderingParameters,
     render::{
         project::{ProjectedParticle, SpriteKind, project_particles},
-        resolve::{ColumnExtents, DepthLayer, GasResolver, LayerSums, RowBuffer},
+        resolve::{ColumnExtents, DepthLayer, GasResolver, LayerSums, ResolvedRow, mean_temperature},
         splat::{
             MIN_RADIUS_CELLS, SplatSettings, Sprite,
             grid::{Grid, weighted_sum},
@@ -67,7 +67,7 @@ pub(crate) const DEFLECTION: [usize; 2] = [2, 3];
 const MOTION: [usize; 2] = [4, 5];
 
 /// Motion of the glowing gas: sums of luminance, and of luminance times motion in pixels to the right and down.
-pub(crate) struct MotionField<'a> {
+pub(crate) struct GasMotionField<'a> {
     grid: Grid<'a>,
     weights: Vec<[f32; 4]>,
     /// Minimum and maximum motion of all particles, for each component.
@@ -77,7 +77,7 @@ pub(crate) struct MotionField<'a> {
 /// Glowing particles as sprites of their motion.
 struct MotionSprites<'a> {
     gas: &'a Gas<'a>,
-    rendering: &'a RenderingParameters,
+    rendering: &'a GasRenderingParameters,
 }
 
 impl MotionSprites<'_> {
@@ -103,8 +103,8 @@ impl SpriteKind for MotionSprites<'_> {
     }
 }
 
-impl<'a> MotionField<'a> {
-    pub(crate) fn new(gas: &Gas<'a>, rendering: &RenderingParameters, view: &View) -> Option<Self> {
+impl<'a> GasMotionField<'a> {
+    pub(crate) fn new(gas: &Gas<'a>, rendering: &GasRenderingParameters, view: &GasView) -> Option<Self> {
         let sprites = project_particles(gas, view, &MotionSprites { gas, rendering });
         let motions = |axis: usize| {
             sprites.iter().flat_map(|task| task.iter()).map(move |sprite| sprite.values[1 + axis] / sprite.values[0])
@@ -117,6 +117,7 @@ impl<'a> MotionField<'a> {
                 layers: 1,
                 picture: view.size,
                 window: view.window,
+                camera: view.camera,
             },
             &sprites,
             gas.buffers,
@@ -150,38 +151,65 @@ pub(crate) fn min_max(values: impl Iterator<Item = f32>) -> [f32; 2] {
     })
 }
 
+/// What a layer of the gas shows at a pixel, without self-absorption.
+pub(crate) struct Measured {
+    pub(crate) tau: f32,
+    pub(crate) luminance: f32,
+    pub(crate) luminance_kelvin: f32,
+}
+
+impl Measured {
+    /// Adds it to the AOVs of a pixel, unless the plate hides it. Temperatures are limited to those of the gas.
+    #[inline(always)]
+    pub(crate) fn write(
+        &self,
+        strip: &mut Strip,
+        depth: f32,
+        [x, y]: [usize; 2],
+        temperatures: [f32; 2],
+        motion: Option<&GasMotionField<'_>>,
+    ) {
+        /// Luminance above which temperature and motion are recorded, cd/m^2.
+        const MIN_LUMINANCE: f32 = 1e-3;
+        let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+        if !strip.visible(index, depth) {
+            return;
+        }
+        strip.aovs[OPTICAL_DEPTH].add(index, self.tau, 1.0);
+        if self.luminance > MIN_LUMINANCE {
+            let kelvin = mean_temperature(self.luminance_kelvin, self.luminance, temperatures);
+            strip.aovs[TEMPERATURE].add(index, kelvin, self.luminance);
+            let motion_pixels = motion.map_or([0.0; 2], |motion| motion.at(x, y));
+            (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, motion_pixels[axis], self.luminance));
+        }
+    }
+}
+
 impl GasResolver<'_> {
     /// Adds the AOVs of a layer in `rect` of a strip. Evaluated only where AOVs are requested, one pixel at a time.
     pub(crate) fn write_layer_aovs(
         &self,
         layer: &DepthLayer,
         extents: &ColumnExtents,
-        motion: Option<&MotionField<'_>>,
+        motion: Option<&GasMotionField<'_>>,
         rect: Rect,
-        row: &mut RowBuffer,
+        row: &mut ResolvedRow,
         strip: &mut Strip,
     ) {
-        /// Luminance above which temperature and motion are recorded, cd/m^2.
-        const MIN_LUMINANCE: f32 = 1e-3;
         for y in rect.y..rect.bottom() {
             let Some([first, last]) = self.fill(layer.index, y, extents, row) else { continue };
             let from = first.max(rect.x) / 16 * 16;
             for x in (from..last.min(rect.right())).step_by(16) {
-                let Some(sums) = self.sums(row, layer.index, x) else { continue };
+                let Some(sums) = self.sums(row, layer.index, [x, y]) else { continue };
                 for pixel in x.max(rect.x)..(x + 16).min(rect.right()) {
                     let lane = pixel - x;
-                    let index = (y - strip.rect.y) * strip.rect.width + pixel - strip.rect.x;
                     let LayerSums { tau, luminance, luminance_kelvin, .. } = &sums;
-                    let (tau, luminance, luminance_kelvin) = (tau[lane], luminance[lane], luminance_kelvin[lane]);
-                    if !strip.visible(index, layer.depth as f32) {
-                        continue;
-                    }
-                    strip.aovs[OPTICAL_DEPTH].add(index, tau, 1.0);
-                    if luminance > MIN_LUMINANCE {
-                        strip.aovs[TEMPERATURE].add(index, self.temperature(luminance_kelvin, luminance), luminance);
-                        let motion_pixels = motion.map_or([0.0; 2], |motion| motion.at(pixel, y));
-                        (0..2).for_each(|axis| strip.aovs[MOTION[axis]].add(index, motion_pixels[axis], luminance));
-                    }
+                    let measured = Measured {
+                        tau: tau[lane],
+                        luminance: luminance[lane],
+                        luminance_kelvin: luminance_kelvin[lane],
+                    };
+                    measured.write(strip, layer.depth as f32, [pixel, y], self.temperatures, motion);
                 }
             }
         }

@@ -6,14 +6,14 @@
 use bansho_base::{
     host::parallel::prelude::*,
     image::{Image, Rect},
-    phenomenon::strip::{Strip, View},
+    phenomenon::strip::Strip,
     world::air::Air,
 };
 use fearless_simd::dispatch;
 
-use super::{aovs::DEFLECTION, gas::Gas};
+use super::{aovs::DEFLECTION, gas::Gas, gas_view::GasView};
 use crate::particles::{
-    parameters::{HeatHazeModel, RenderingParameters},
+    parameters::{GasRenderingParameters, HeatHazeModel},
     render::{
         depth_layers::is_visible,
         project::{ProjectedParticle, SpriteKind, project_particles},
@@ -46,7 +46,7 @@ pub(crate) struct HeatHaze {
 /// Optical path difference to air along a ray through the center of a particle's sprite, in pixels at its depth: the gradient of
 /// the summed path differences, per pixel, is an angle.
 #[inline(always)]
-pub(crate) fn optical_path(gas: &Gas, rendering: &RenderingParameters, projected: &ProjectedParticle) -> f32 {
+pub(crate) fn optical_path(gas: &Gas, rendering: &GasRenderingParameters, projected: &ProjectedParticle) -> f32 {
     let refractivity_excess = refractivity_excess(gas, projected.index);
     let volume = match rendering.heat_haze_model {
         HeatHazeModel::Refraction => gas.volume(projected.index),
@@ -65,7 +65,7 @@ fn emitted_volume(gas: &Gas, index: usize) -> f64 {
 }
 
 /// Profile of the optical path of a particle, whose gradient deflects light.
-fn profile(rendering: &RenderingParameters) -> Profile {
+fn profile(rendering: &GasRenderingParameters) -> Profile {
     match rendering.heat_haze_model {
         HeatHazeModel::Refraction => Profile::LINE,
         // The gradient of poly6: figure 3 of the paper.
@@ -82,7 +82,7 @@ fn refractivity_excess(gas: &Gas, index: usize) -> f64 {
 /// Particles as sprites of their optical path: those that neither emit nor absorb, or all.
 struct RefractionSprites<'a> {
     gas: &'a Gas<'a>,
-    rendering: &'a RenderingParameters,
+    rendering: &'a GasRenderingParameters,
     whole_gas: bool,
 }
 
@@ -112,8 +112,8 @@ impl HeatHaze {
     /// when no gas has been splatted at all, all of it.
     pub(crate) fn new(
         gas: &Gas,
-        rendering: &RenderingParameters,
-        view: &View,
+        rendering: &GasRenderingParameters,
+        view: &GasView,
         splatted: Option<&Grid<'_>>,
         whole_gas: bool,
     ) -> Option<Self> {
@@ -126,6 +126,7 @@ impl HeatHaze {
             layers: 1,
             picture: view.size,
             window: view.window,
+            camera: view.camera,
         };
         let remaining = splat(
             &settings,

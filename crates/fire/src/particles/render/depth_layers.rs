@@ -6,15 +6,16 @@ use std::ops::Range;
 
 use bansho_base::{
     host::parallel::prelude::*,
-    math::DVec3,
-    phenomenon::strip::{DepthInterval, View},
+    math::{DVec3, Vec3},
+    phenomenon::strip::DepthInterval,
 };
 use fearless_simd::dispatch;
 
 use crate::particles::{
-    parameters::{RenderingParameters, SpriteStyle},
+    parameters::{GasRenderingParameters, SpriteStyle},
     render::{
         gas::{Gas, PARTICLES_PER_TASK},
+        gas_view::GasView,
         resolve::detail::DetailScale,
     },
 };
@@ -28,6 +29,9 @@ pub(crate) struct DepthLayers {
     pub(crate) thickness: f64,
     pub(crate) count: usize,
 }
+
+/// Weight of gas that does not absorb, as an absorption coefficient in 1/m: it decides where nothing absorbs.
+const MIN_ABSORPTION: f64 = 1e-9;
 
 /// Maximum number of layers of a flame.
 pub(crate) const MAX_LAYERS: usize = 4;
@@ -94,7 +98,7 @@ impl DepthLayers {
 
 /// Whether a particle contributes to the picture's light or opacity.
 #[inline(always)]
-pub(crate) fn is_visible(gas: &Gas, rendering: &RenderingParameters, index: usize) -> bool {
+pub(crate) fn is_visible(gas: &Gas, rendering: &GasRenderingParameters, index: usize) -> bool {
     match rendering.sprite {
         SpriteStyle::LineIntegral => gas.absorption(index, rendering) > 0.0 || gas.is_blue(index, rendering),
         SpriteStyle::Poly6 | SpriteStyle::Squares => true,
@@ -109,6 +113,26 @@ pub(crate) struct GasStatistics {
     /// Sum of all support radii, m.
     radius_sum: f64,
     luminous: LuminousSums,
+    scale: ScaleSums,
+}
+
+/// Sums over the gas that is seen, weighted by its absorption, or, where nothing absorbs, by its volume.
+#[derive(Clone, Copy, Debug, Default)]
+struct ScaleSums {
+    weight: f64,
+    /// Of the support radius, pixels.
+    radius: f64,
+    /// Of the position relative to the particles' origin, m.
+    position: DVec3,
+}
+
+/// Scale of the gas in the picture, which decides how many samples an exposure needs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PictureScale {
+    /// Mean support radius, pixels.
+    pub(crate) radius: f64,
+    /// Mean position, m.
+    pub(crate) center: DVec3,
 }
 
 /// Sums over the gas that emits light, weighted by luminous intensity.
@@ -124,8 +148,24 @@ struct LuminousSums {
     pixels_per_meter: f64,
 }
 
+impl ScaleSums {
+    #[inline(always)]
+    fn add(&mut self, gas: &Gas, index: usize, weight: f64, pixels_per_meter: f64) {
+        let [x, y, z] = &gas.particles.position;
+        self.weight += weight;
+        self.radius += weight * f64::from(gas.particles.support_radius[index]) * pixels_per_meter;
+        self.position += Vec3::new(x[index], y[index], z[index]).as_dvec3() * weight;
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.weight += other.weight;
+        self.radius += other.radius;
+        self.position += other.position;
+    }
+}
+
 impl GasStatistics {
-    pub(crate) fn new(gas: &Gas, rendering: &RenderingParameters, view: &View) -> Self {
+    pub(crate) fn new(gas: &Gas, rendering: &GasRenderingParameters, view: &GasView) -> Self {
         let (count, level) = (gas.particles.len(), bansho_base::math::simd::level());
         let of_task = |task: usize| {
             let mut statistics = Self::default();
@@ -139,14 +179,14 @@ impl GasStatistics {
     }
 
     #[inline(always)]
-    fn add_all(&mut self, gas: &Gas, rendering: &RenderingParameters, view: &View, range: Range<usize>) {
+    fn add_all(&mut self, gas: &Gas, rendering: &GasRenderingParameters, view: &GasView, range: Range<usize>) {
         for index in range {
             self.add(gas, rendering, view, index);
         }
     }
 
     #[inline(always)]
-    fn add(&mut self, gas: &Gas, rendering: &RenderingParameters, view: &View, index: usize) {
+    fn add(&mut self, gas: &Gas, rendering: &GasRenderingParameters, view: &GasView, index: usize) {
         let radius = f64::from(gas.particles.support_radius[index]);
         self.radius_sum += radius;
         if !is_visible(gas, rendering, index) {
@@ -159,6 +199,7 @@ impl GasStatistics {
         let volume = gas.volume(index);
         self.depth.add(depth, volume);
         let absorption = gas.absorption(index, rendering);
+        self.scale.add(gas, index, volume * absorption.max(MIN_ABSORPTION), view.camera.focal_pixels / depth);
         if absorption > 0.0 && rendering.sprite == SpriteStyle::LineIntegral {
             let intensity = absorption * volume * gas.luminance(index);
             self.luminous.intensity += intensity;
@@ -171,11 +212,19 @@ impl GasStatistics {
     fn merge(mut self, other: &Self) -> Self {
         self.depth.merge(&other.depth);
         self.radius_sum += other.radius_sum;
+        self.scale.merge(&other.scale);
         self.luminous.intensity += other.luminous.intensity;
         self.luminous.radius += other.luminous.radius;
         self.luminous.absorption += other.luminous.absorption;
         self.luminous.pixels_per_meter += other.luminous.pixels_per_meter;
         self
+    }
+
+    /// The scale of the gas in the picture; `None` if none is seen.
+    pub(crate) fn picture_scale(&self, gas: &Gas) -> Option<PictureScale> {
+        let ScaleSums { weight, radius, position } = self.scale;
+        (weight > 0.0)
+            .then(|| PictureScale { radius: radius / weight, center: gas.particles.origin + position / weight })
     }
 
     /// The depth layers.
@@ -186,7 +235,7 @@ impl GasStatistics {
     }
 
     /// Means, weighted by luminous intensity, that determine the scale of detail; `None` if no gas emits light.
-    pub(crate) fn detail_scale(&self, gas: &Gas, view: &View) -> Option<DetailScale> {
+    pub(crate) fn detail_scale(&self, gas: &Gas, view: &GasView) -> Option<DetailScale> {
         let LuminousSums { intensity, radius, absorption, pixels_per_meter } = self.luminous;
         (intensity > 0.0).then(|| DetailScale {
             radius: radius / intensity,
@@ -200,8 +249,8 @@ impl GasStatistics {
 }
 
 /// Apparent motion of a static point at the flame while the shutter is open, m in world axes.
-fn camera_motion(position: DVec3, view: &View) -> [f64; 3] {
-    let (opened, closed) = (view.camera_at(view.shutter.open), view.camera_at(view.shutter.close));
+fn camera_motion(position: DVec3, view: &GasView) -> [f64; 3] {
+    let Some([opened, closed]) = &view.ends else { return [0.0; 3] };
     let local = closed.point_in_camera(position) - opened.point_in_camera(position);
     (view.camera.world_from_camera * local).to_array().map(|value| -value)
 }

@@ -6,12 +6,18 @@ use bansho_base::{
     color,
     host::parallel::prelude::*,
     math::DVec3,
-    phenomenon::surroundings::{Emitter, Light},
+    phenomenon::{
+        strip::Shutter,
+        surroundings::{Emitter, Light},
+    },
 };
 use fearless_simd::dispatch;
 
-use super::gas::{Gas, PARTICLES_PER_TASK};
-use crate::particles::parameters::RenderingParameters;
+use super::{
+    gas::{Gas, PARTICLES_PER_TASK},
+    samples::{GasExposure, GasState},
+};
+use crate::particles::parameters::GasRenderingParameters;
 
 /// Slabs of height over which emission is accumulated.
 const SLABS: usize = 48;
@@ -52,7 +58,7 @@ impl Slab {
 ///
 /// Soot of volume V with absorption coefficient k and temperature T emits `V k B(T)` in every direction. Self-absorption of a
 /// segment is that of a slab of the same optical depth, `(1 - exp(-tau)) / tau`.
-pub fn point_lights_of_gas(gas: &Gas, rendering: &RenderingParameters, t: f64) -> Vec<Light> {
+pub fn point_lights_of_gas(gas: &Gas, rendering: &GasRenderingParameters, t: f64) -> Vec<Light> {
     let count = rendering.light.count.max(1) as usize;
     if rendering.light.scale <= 0.0 || gas.particles.is_empty() {
         return Vec::new();
@@ -69,8 +75,31 @@ pub fn point_lights_of_gas(gas: &Gas, rendering: &RenderingParameters, t: f64) -
         .collect()
 }
 
+/// Point lights that represent the gas during an exposure: each is the mean of those of the states.
+pub fn point_lights_of_exposure(
+    exposure: &GasExposure,
+    rendering: &GasRenderingParameters,
+    shutter: Shutter,
+) -> Vec<Light> {
+    let GasExposure { middle, states, is_short } = exposure;
+    if *is_short || states.len() == 1 {
+        return point_lights_of_gas(middle, rendering, shutter.middle());
+    }
+    let total: f64 = states.iter().map(|state| state.shutter.duration()).sum();
+    let mut of_segments: Vec<Vec<Light>> = Vec::new();
+    for GasState { gas, shutter } in states {
+        let weight = (shutter.duration() / total) as f32;
+        let lights = point_lights_of_gas(gas, rendering, shutter.middle());
+        of_segments.resize_with(of_segments.len().max(lights.len()), Vec::new);
+        for (segment, light) in of_segments.iter_mut().zip(lights) {
+            segment.push(Light { intensity: light.intensity.map(|value| weight * value), ..light });
+        }
+    }
+    of_segments.iter().filter_map(Light::merge_points).collect()
+}
+
 /// Emission by height. Each particle is distributed to the two nearest slabs.
-fn slabs(gas: &Gas, rendering: &RenderingParameters, t: f64) -> Vec<Slab> {
+fn slabs(gas: &Gas, rendering: &GasRenderingParameters, t: f64) -> Vec<Slab> {
     let (low, high) = height_range(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
     let level = bansho_base::math::simd::level();
@@ -101,14 +130,14 @@ fn height_range(gas: &Gas, t: f64) -> (f64, f64) {
             .fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
     };
     let min_max = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    tasks(gas).into_par_iter().map(task_range).reduce(|| (f64::MAX, f64::MIN), min_max)
+    tasks(gas).into_par_iter().map(task_range).reduce_with(min_max).unwrap_or((f64::MAX, f64::MIN))
 }
 
 /// Adds particles to slabs that are `step` apart, from the height `low` on.
 #[inline(always)]
 fn add_to_slabs(
     gas: &Gas,
-    rendering: &RenderingParameters,
+    rendering: &GasRenderingParameters,
     t: f64,
     range: Range<usize>,
     [low, step]: [f64; 2],
@@ -134,7 +163,7 @@ fn add_to_slabs(
 }
 
 /// The light of the segment of the flame between two values of cumulative power.
-fn segment_light(slabs: &[Slab], [from, to]: [f64; 2], rendering: &RenderingParameters) -> Option<Light> {
+fn segment_light(slabs: &[Slab], [from, to]: [f64; 2], rendering: &GasRenderingParameters) -> Option<Light> {
     let mut sum = Slab::default();
     let mut cumulative = 0.0;
     for slab in slabs {

@@ -5,7 +5,7 @@ use bansho_base::{
     math::{self, DVec2, DVec3, Vec3, random::Key},
 };
 
-use crate::particles::{Particles, parameters::RenderingParameters, render::buffer_pool::BufferPool};
+use crate::particles::{GasParticles, parameters::GasRenderingParameters, render::buffer_pool::BufferPool};
 
 /// Particles per task of the thread pool.
 pub(crate) const PARTICLES_PER_TASK: usize = 2048;
@@ -14,7 +14,7 @@ pub(crate) const PARTICLES_PER_TASK: usize = 2048;
 #[derive(Clone, Copy, Debug)]
 pub struct Gas<'a> {
     /// The particles.
-    pub particles: &'a Particles,
+    pub particles: &'a GasParticles,
     /// Time of the particles' state, s.
     pub time: f64,
     /// Temperature of the surrounding air, K.
@@ -73,7 +73,7 @@ const BLUE_PEAK_BURNED: f64 = 0.06;
 
 /// Absorption coefficient of soot for a volume fraction, 1/m.
 #[inline(always)]
-pub fn soot_absorption(volume_fraction: f64, rendering: &RenderingParameters) -> f64 {
+pub fn soot_absorption(volume_fraction: f64, rendering: &GasRenderingParameters) -> f64 {
     volume_fraction * VISIBLE_SOOT_ABSORPTION * rendering.soot_gain
 }
 
@@ -91,7 +91,7 @@ impl Gas<'_> {
     /// Volume m / rho that a particle represents, m^3, times the factor of its fade-out.
     #[inline(always)]
     pub(crate) fn volume(&self, index: usize) -> f64 {
-        let Particles { position, velocity, density, mass, max_age, age, .. } = self.particles;
+        let GasParticles { position, velocity, density, mass, max_age, age, .. } = self.particles;
         let [position, velocity] = [position, velocity].map(|[x, y, z]| Vec3::new(x[index], y[index], z[index]));
         let remaining = self.fade_out.remaining_fraction(position, velocity, max_age[index] - age[index]);
         let density = f64::from(density[index]);
@@ -100,7 +100,7 @@ impl Gas<'_> {
 
     /// Absorption coefficient of a particle's soot, 1/m.
     #[inline(always)]
-    pub(crate) fn absorption(&self, index: usize, rendering: &RenderingParameters) -> f64 {
+    pub(crate) fn absorption(&self, index: usize, rendering: &GasRenderingParameters) -> f64 {
         soot_absorption(f64::from(self.particles.soot[index]), rendering)
     }
 
@@ -112,7 +112,7 @@ impl Gas<'_> {
 
     /// Whether a particle emits blue light: it has started to burn and is not burnt out.
     #[inline(always)]
-    pub(crate) fn is_blue(&self, index: usize, rendering: &RenderingParameters) -> bool {
+    pub(crate) fn is_blue(&self, index: usize, rendering: &GasRenderingParameters) -> bool {
         /// Fuel fraction below which the blue light is less than 1e-4 of its maximum.
         const BURNT_OUT: f32 = 1.0 - 14.0 * BLUE_PEAK_BURNED as f32;
         let fuel = self.particles.fuel[index];
@@ -123,7 +123,7 @@ impl Gas<'_> {
     ///
     /// CH and C2 exist where fuel has just started to burn; where soot has formed there are none.
     #[inline(always)]
-    pub(crate) fn blue_luminance(&self, index: usize, rendering: &RenderingParameters) -> f64 {
+    pub(crate) fn blue_luminance(&self, index: usize, rendering: &GasRenderingParameters) -> f64 {
         if !self.is_blue(index, rendering) {
             return 0.0;
         }

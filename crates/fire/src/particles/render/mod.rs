@@ -7,28 +7,33 @@
 //!    smooth, which cubic B-splines interpolate (`spline`). Memory comes from `buffer_pool`.
 //! 5. `resolve`: interpolation along rows (`upsample`), detail below the size of particles (`detail`, `strain`), and light per pixel.
 //! 6. `deflection`: heat haze. `emitted_light`: point lights for other objects. `aovs`: AOVs. `paper_squares`: the paper's figure 7.
-//! 7. `prepared`: one frame, drawn into strips.
+//! 7. `prepared`: one frame, drawn into strips. Where the gas moves far in the open shutter, or is small in the picture, it is the mean of many
+//!    `samples` in time and of parts of pixels: `gas_view` is what one of them sees, `exposed` sums their light.
 
 mod aovs;
 pub(crate) mod buffer_pool;
 mod deflection;
 mod depth_layers;
 mod emitted_light;
+mod exposed;
 pub(crate) mod gas;
+mod gas_view;
 mod paper_squares;
 mod prepared;
 pub(crate) mod project;
 pub(crate) mod resolve;
+mod samples;
 pub(crate) mod splat;
 
 pub use aovs::AOVS;
 pub use buffer_pool::BufferPool;
-pub use emitted_light::point_lights_of_gas;
+pub use emitted_light::{point_lights_of_exposure, point_lights_of_gas};
 pub use gas::{FadeOut, Gas, soot_absorption};
 pub use prepared::{PreparedGas, depth_intervals};
+pub use samples::{GasExposure, GasState};
 pub use splat::kernel::{line_gradient, line_integral};
 
-pub use crate::particles::parameters::{GasLightParameters, HeatHazeModel, RenderingParameters, SpriteStyle};
+pub use crate::particles::parameters::{GasLightParameters, GasRenderingParameters, HeatHazeModel, SpriteStyle};
 
 #[cfg(test)]
 mod tests;

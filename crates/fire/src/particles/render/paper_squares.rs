@@ -4,13 +4,14 @@ use bansho_base::{
     color,
     image::Rect,
     math,
-    phenomenon::strip::{DepthInterval, Strip, View},
+    phenomenon::strip::{DepthInterval, Strip},
 };
 
 use crate::particles::{
-    parameters::RenderingParameters,
+    parameters::GasRenderingParameters,
     render::{
         gas::Gas,
+        gas_view::GasView,
         project::{ProjectedParticle, SpriteKind, project_particles},
     },
 };
@@ -54,7 +55,7 @@ impl SpriteKind for SquareSprites<'_> {
 pub(crate) struct Squares(Vec<Square>);
 
 impl Squares {
-    pub(crate) fn new(gas: &Gas, rendering: &RenderingParameters, view: &View) -> Self {
+    pub(crate) fn new(gas: &Gas, rendering: &GasRenderingParameters, view: &GasView) -> Self {
         let kind = SquareSprites {
             gas,
             side: rendering.square_size as f32,

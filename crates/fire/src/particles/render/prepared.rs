@@ -3,30 +3,35 @@
 use std::sync::OnceLock;
 
 use bansho_base::{
+    camera::Camera,
     host::{
         observer::{Cancelled, Observer, check},
         once::get_or_compute,
     },
     image::Rect,
-    math::DVec3,
+    math::{DVec3, simd::LANES},
     phenomenon::{
         Deflection, Prepared,
         strip::{DepthInterval, Strip, View},
         surroundings::Surroundings,
     },
+    world::wind::Wind,
 };
 use fearless_simd::{Level, dispatch};
 
 use super::{
-    aovs::{MotionField, min_max},
+    aovs::{GasMotionField, min_max},
     deflection::{self, HeatHaze},
     depth_layers::DepthLayers,
+    exposed::{ExposedGas, ExposureSample},
     gas::Gas,
+    gas_view::GasView,
+    samples::{GasExposure, GasState, pixel_subdivision},
 };
 use crate::{
     chemiluminescence_color,
     particles::{
-        parameters::{HeatHazeModel, RenderingParameters, SpriteStyle},
+        parameters::{GasRenderingParameters, HeatHazeModel, SpriteStyle},
         render::{
             depth_layers::{GasStatistics, is_visible},
             paper_squares::Squares,
@@ -38,18 +43,24 @@ use crate::{
             splat::{MIN_RADIUS_CELLS, SplatResult, SplatSettings, Sprite, grid::Grid, kernel::Profile, splat},
         },
     },
-    sparks::{SparkEmitter, Streak},
+    sparks::{SparkEmitter, SparkStreak},
 };
 
 /// The gas of one frame, ready to be drawn into strips.
 pub struct PreparedGas<'a> {
     gas: Gas<'a>,
-    rendering: &'a RenderingParameters,
+    rendering: &'a GasRenderingParameters,
     view: &'a View,
+    /// The whole exposure as one sample.
+    gas_view: GasView,
     level: Level,
     layers: DepthLayers,
     mode: DrawMode<'a>,
-    sparks: Vec<Streak>,
+    /// Radiance that opaque soot of each layer scatters toward the camera, ACEScg, cd/m^2.
+    scattered: Vec<[f32; 3]>,
+    /// If AOVs are requested and any gas emits light.
+    motion: Option<GasMotionField<'a>>,
+    sparks: Vec<SparkStreak>,
     /// Computed on demand: for its AOV, or to refract light from behind.
     haze: OnceLock<Option<HeatHaze>>,
 }
@@ -62,24 +73,25 @@ enum DrawMode<'a> {
     OutsideWindow,
     /// Sprites summed on a grid.
     SplattedGas(Box<SplattedGas<'a>>),
+    /// The mean of several samples.
+    Exposed(ExposedGas),
     /// The paper's density squares.
     Squares(Squares),
 }
 
+/// Sums of one sample.
 struct SplattedGas<'a> {
     grid: Grid<'a>,
     extents: ColumnExtents,
     weights: Vec<[f32; 4]>,
     row_interpolator: RowInterpolator,
     detail: Option<(Detail, Strain)>,
-    scattered: Vec<[f32; 3]>,
-    /// If AOVs are requested and any gas emits light.
-    motion: Option<MotionField<'a>>,
     temperatures: [f32; 2],
+    camera: Camera,
 }
 
 /// Sparks of the fire.
-fn spark_emitter<'a>(gas: &Gas, rendering: &'a RenderingParameters, view: &View) -> SparkEmitter<'a> {
+fn spark_emitter<'a>(gas: &Gas, rendering: &'a GasRenderingParameters, view: &View) -> SparkEmitter<'a> {
     SparkEmitter {
         parameters: &rendering.sparks,
         key: gas.key,
@@ -95,52 +107,73 @@ fn spark_emitter<'a>(gas: &Gas, rendering: &'a RenderingParameters, view: &View)
 }
 
 /// Depth intervals of the gas and its sparks.
-pub fn depth_intervals(gas: &Gas, rendering: &RenderingParameters, view: &View) -> Vec<DepthInterval> {
+pub fn depth_intervals(gas: &Gas, rendering: &GasRenderingParameters, view: &View, wind: &Wind) -> Vec<DepthInterval> {
     if gas.particles.is_empty() && rendering.sparks.rate <= 0.0 {
         return Vec::new();
     }
-    let layers = GasStatistics::new(gas, rendering, view).layers(gas);
+    let layers = GasStatistics::new(gas, rendering, &GasView::new(view)).layers(gas);
     let mut intervals: Vec<DepthInterval> = layers.intervals().collect();
-    if rendering.sparks.rate > 0.0 {
-        let middle = layers.center(layers.count / 2);
-        let half_depth = rendering.sparks.swirl + 0.5 * layers.thickness * layers.count as f64;
-        intervals.push(DepthInterval { near: (middle - half_depth).max(0.0), far: middle + half_depth });
-    }
+    intervals.extend(spark_emitter(gas, rendering, view).depths(view, wind));
     intervals
 }
 
 impl<'a> PreparedGas<'a> {
-    /// Prepares the gas for `view`.
+    /// Prepares the gas for `view`, from one state, whose motion is extrapolated.
     ///
     /// # Errors
     /// The observer asked to stop.
     pub fn new(
         gas: Gas<'a>,
-        rendering: &'a RenderingParameters,
+        rendering: &'a GasRenderingParameters,
+        view: &'a View,
+        surroundings: &Surroundings,
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
+        let states = vec![GasState { gas, shutter: view.shutter }];
+        let exposure = GasExposure { middle: gas, states, is_short: true };
+        Self::of_exposure(&exposure, rendering, view, surroundings, observer)
+    }
+
+    /// Prepares the gas for `view`, from the states that it passes through while the shutter is open.
+    ///
+    /// # Errors
+    /// The observer asked to stop.
+    pub fn of_exposure(
+        exposure: &GasExposure<'a>,
+        rendering: &'a GasRenderingParameters,
         view: &'a View,
         surroundings: &Surroundings,
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         check(observer)?;
-        let statistics = GasStatistics::new(&gas, rendering, view);
+        let gas = exposure.middle;
+        let (gas_view, level) = (GasView::new(view), bansho_base::math::simd::level());
+        let statistics = GasStatistics::new(&gas, rendering, &gas_view);
         let layers = statistics.layers(&gas);
-        let mode = match rendering.sprite {
-            SpriteStyle::Squares => DrawMode::Squares(Squares::new(&gas, rendering, view)),
-            _ => splat_gas(&gas, rendering, view, &statistics, surroundings),
+        let scattered: Vec<[f32; 3]> = (0..layers.count)
+            .map(|layer| scattered(&gas, rendering, view, layers.center(layer), surroundings))
+            .collect();
+        let scale = statistics.picture_scale(&gas);
+        let samples = exposure.samples(view, scale);
+        let finer = pixel_subdivision(scale, view);
+        let mode = match (rendering.sprite, samples.as_slice()) {
+            (SpriteStyle::Squares, _) => DrawMode::Squares(Squares::new(&gas, rendering, &gas_view)),
+            (_, [GasState { gas, .. }]) if finer == 1 => splat_gas(gas, rendering, &gas_view, &statistics, &layers),
+            _ => {
+                let sampled = SampledExposure { rendering, view, layers: &layers, scattered: &scattered, finer, level };
+                sampled.mean(&samples, observer)?
+            }
         };
         check(observer)?;
         let mut sparks = spark_emitter(&gas, rendering, view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        let prepared = Self {
-            gas,
-            rendering,
-            view,
-            level: bansho_base::math::simd::level(),
-            layers,
-            mode,
-            sparks,
-            haze: OnceLock::new(),
+        let motion = if view.aovs_requested && matches!(mode, DrawMode::SplattedGas(_) | DrawMode::Exposed(_)) {
+            GasMotionField::new(&gas, rendering, &gas_view)
+        } else {
+            None
         };
+        let haze = OnceLock::new();
+        let prepared = Self { gas, rendering, view, gas_view, level, layers, mode, scattered, motion, sparks, haze };
         if view.aovs_requested {
             prepared.haze();
         }
@@ -149,41 +182,98 @@ impl<'a> PreparedGas<'a> {
 
     /// The layers in a slice, nearest first.
     fn layers_in<'b>(&'b self, slice: &'b DepthInterval) -> impl Iterator<Item = DepthLayer> + 'b {
-        let thickness = self.layers.thickness;
-        let layer = move |index| DepthLayer { index, depth: self.layers.center(index), thickness };
-        (0..self.layers.count).map(layer).filter(|layer| slice.contains(layer.depth))
+        layers_of(&self.layers).filter(|layer| slice.contains(layer.depth))
     }
+}
 
-    fn resolver<'b>(&'b self, splatted: &'b SplattedGas<'_>) -> GasResolver<'b> {
+/// All layers, nearest first.
+fn layers_of(layers: &DepthLayers) -> impl Iterator<Item = DepthLayer> {
+    let layers = *layers;
+    (0..layers.count).map(move |index| DepthLayer { index, depth: layers.center(index), thickness: layers.thickness })
+}
+
+impl SplattedGas<'_> {
+    fn resolver<'b>(
+        &'b self,
+        gas: &Gas,
+        rendering: &GasRenderingParameters,
+        scattered: &'b [[f32; 3]],
+    ) -> GasResolver<'b> {
         GasResolver {
-            grid: &splatted.grid,
-            camera: &self.view.camera,
-            origin: self.gas.particles.origin,
-            detail: splatted.detail.as_ref().map(|(detail, strain)| (detail, strain)),
-            self_absorption: self.rendering.sprite == SpriteStyle::LineIntegral,
+            grid: &self.grid,
+            camera: &self.camera,
+            origin: gas.particles.origin,
+            detail: self.detail.as_ref().map(|(detail, strain)| (detail, strain)),
+            self_absorption: rendering.sprite == SpriteStyle::LineIntegral,
             blue: chemiluminescence_color(),
-            scattered: &splatted.scattered,
-            weights: &splatted.weights,
-            row_interpolator: &splatted.row_interpolator,
-            temperatures: splatted.temperatures,
+            scattered,
+            weights: &self.weights,
+            row_interpolator: &self.row_interpolator,
+            temperatures: self.temperatures,
         }
     }
 }
 
-/// Splats all sprites into their depth layers.
+/// An exposure that is the mean of several samples.
+struct SampledExposure<'a> {
+    rendering: &'a GasRenderingParameters,
+    view: &'a View,
+    layers: &'a DepthLayers,
+    scattered: &'a [[f32; 3]],
+    /// Pixels of a sample along the side of one of the picture's.
+    finer: usize,
+    level: Level,
+}
+
+impl SampledExposure<'_> {
+    /// The mean of samples, weighted by the times for which they are exposed.
+    fn mean<'a>(&self, samples: &[GasState<'a>], observer: &dyn Observer) -> Result<DrawMode<'a>, Cancelled> {
+        let total: f64 = samples.iter().map(|sample| sample.shutter.duration()).sum();
+        let layers: Vec<DepthLayer> = layers_of(self.layers).collect();
+        let mut exposed = ExposedGas::new(layers.len(), self.view.aovs_requested);
+        let mut is_outside_window = false;
+        for GasState { gas, shutter } in samples {
+            check(observer)?;
+            let sample_view = GasView::sample(self.view, *shutter, self.finer);
+            let statistics = GasStatistics::new(gas, self.rendering, &sample_view);
+            match splat_gas(gas, self.rendering, &sample_view, &statistics, self.layers) {
+                DrawMode::SplattedGas(splatted) => {
+                    let sample = ExposureSample {
+                        resolver: &splatted.resolver(gas, self.rendering, self.scattered),
+                        extents: &splatted.extents,
+                        layers: &layers,
+                        rect: sample_view.in_pixels_of_view(splatted.grid.covered()).intersection(&self.view.window),
+                        finer: self.finer,
+                        weight: if total > 0.0 { shutter.duration() / total } else { 1.0 / samples.len() as f64 }
+                            as f32,
+                    };
+                    exposed.add(&sample, self.level);
+                }
+                DrawMode::OutsideWindow => is_outside_window = true,
+                _ => {}
+            }
+        }
+        Ok(match (exposed.rect.is_empty(), is_outside_window) {
+            (false, _) => DrawMode::Exposed(exposed),
+            (true, true) => DrawMode::OutsideWindow,
+            (true, false) => DrawMode::Empty,
+        })
+    }
+}
+
+/// Splats all sprites of a sample into their depth layers.
 fn splat_gas<'a>(
     gas: &Gas<'a>,
-    rendering: &RenderingParameters,
-    view: &View,
+    rendering: &GasRenderingParameters,
+    view: &GasView,
     statistics: &GasStatistics,
-    surroundings: &Surroundings,
+    layers: &DepthLayers,
 ) -> DrawMode<'a> {
-    let layers = statistics.layers(gas);
     let detail = statistics.detail_scale(gas, view).and_then(|scale| Detail::new(gas, rendering, &scale));
     let radiance = RadianceSprites {
         gas,
         rendering,
-        layers: &layers,
+        layers,
         opacity: mean_density(gas).map_or(0.0, |density| rendering.opacity / density),
         detail: detail.as_ref(),
         seconds_since_state: view.shutter.middle() - gas.time,
@@ -197,6 +287,7 @@ fn splat_gas<'a>(
             layers: layers.count,
             picture: view.size,
             window: view.window,
+            camera: view.camera,
         },
         &sprites,
         gas.buffers,
@@ -211,23 +302,23 @@ fn splat_gas<'a>(
         (detail, strain)
     };
     let detail = detail.map(with_strain);
-    let scattered = (0..layers.count).map(|layer| scattered(gas, rendering, view, layers.center(layer), surroundings));
+    let (weights, covered) = (grid.cells.spline_weights(), grid.covered());
+    let end = covered.right().next_multiple_of(LANES).min(view.size[0]);
     DrawMode::SplattedGas(Box::new(SplattedGas {
         extents,
-        weights: grid.cells.spline_weights(),
-        row_interpolator: RowInterpolator::new(&grid, view.size[0], &grid.cells.spline_weights()),
+        row_interpolator: RowInterpolator::new(&grid, covered.x..end, &weights),
+        weights,
         grid,
         detail,
-        scattered: scattered.collect(),
-        motion: if view.aovs_requested { MotionField::new(gas, rendering, view) } else { None },
         temperatures: min_max(gas.particles.temperature.iter().copied()),
+        camera: view.camera,
     }))
 }
 
 /// Visible particles as sprites of emission and absorption.
 struct RadianceSprites<'a> {
     gas: &'a Gas<'a>,
-    rendering: &'a RenderingParameters,
+    rendering: &'a GasRenderingParameters,
     layers: &'a DepthLayers,
     /// Opacity of a poly6 sprite per density.
     opacity: f64,
@@ -301,7 +392,7 @@ fn mean_density(gas: &Gas) -> Option<f64> {
 /// Radiance that opaque soot at a depth scatters toward the camera: isotropic single scattering of other lights.
 fn scattered(
     gas: &Gas,
-    rendering: &RenderingParameters,
+    rendering: &GasRenderingParameters,
     view: &View,
     depth: f64,
     surroundings: &Surroundings,
@@ -321,6 +412,7 @@ impl Prepared for PreparedGas<'_> {
     fn bounds(&self, slice: &DepthInterval) -> Rect {
         let gas = match &self.mode {
             DrawMode::SplattedGas(splatted) if self.layers_in(slice).next().is_some() => splatted.grid.covered(),
+            DrawMode::Exposed(exposed) if self.layers_in(slice).next().is_some() => exposed.rect,
             DrawMode::Squares(squares) => squares.bounds(slice),
             _ => Rect::default(),
         };
@@ -333,26 +425,30 @@ impl Prepared for PreparedGas<'_> {
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let mut sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth)).peekable();
         if let DrawMode::SplattedGas(splatted) = &self.mode {
-            let resolver = self.resolver(splatted);
+            let resolver = splatted.resolver(&self.gas, self.rendering, &self.scattered);
             let mut row = resolver.row();
             let rect = splatted.grid.covered().intersection(&strip.rect);
             for layer in self.layers_in(slice) {
                 while let Some(spark) = sparks.next_if(|spark| spark.depth < layer.depth) {
-                    spark.draw(self.view.size, strip);
+                    spark.draw(self.view, strip);
                 }
                 if rect.is_empty() {
                     continue;
                 }
                 dispatch!(self.level, _simd => resolver.draw_layer(&layer, &splatted.extents, rect, &mut row, strip));
                 if !strip.aovs.is_empty() {
-                    resolver.write_layer_aovs(
-                        &layer,
-                        &splatted.extents,
-                        splatted.motion.as_ref(),
-                        rect,
-                        &mut row,
-                        strip,
-                    );
+                    resolver.write_layer_aovs(&layer, &splatted.extents, self.motion.as_ref(), rect, &mut row, strip);
+                }
+            }
+        }
+        if let DrawMode::Exposed(exposed) = &self.mode {
+            for layer in self.layers_in(slice) {
+                while let Some(spark) = sparks.next_if(|spark| spark.depth < layer.depth) {
+                    spark.draw(self.view, strip);
+                }
+                exposed.draw_layer(&layer, strip);
+                if !strip.aovs.is_empty() {
+                    exposed.write_layer_aovs(&layer, self.motion.as_ref(), strip);
                 }
             }
         }
@@ -362,7 +458,7 @@ impl Prepared for PreparedGas<'_> {
         if !strip.aovs.is_empty() {
             self.write_deflection_aovs(slice, strip);
         }
-        sparks.for_each(|spark| spark.draw(self.view.size, strip));
+        sparks.for_each(|spark| spark.draw(self.view, strip));
     }
 
     fn may_refract(&self) -> bool {
@@ -387,7 +483,8 @@ impl PreparedGas<'_> {
             DrawMode::OutsideWindow if is_splatted => (None, false),
             _ => (None, true),
         };
-        get_or_compute(&self.haze, || HeatHaze::new(&self.gas, self.rendering, self.view, splatted, whole_gas)).as_ref()
+        get_or_compute(&self.haze, || HeatHaze::new(&self.gas, self.rendering, &self.gas_view, splatted, whole_gas))
+            .as_ref()
     }
 
     /// The haze, if its AOVs are requested and are written in this slice, that of the last layer.

@@ -15,7 +15,7 @@ use crate::particles::{
         fluid::{NeighborSums, Neighborhood},
         forces::external_forces::{BurnerForces, ExternalForces},
         particle_lanes::{BatchUpdate, RowBatch, SharedColumns, for_each_burner_batch},
-        particles::Particles,
+        particles::GasParticles,
         vectors::{add_scaled, length},
     },
 };
@@ -151,8 +151,8 @@ impl CombustionModel {
     #[inline(always)]
     pub(crate) fn relative_soot<R: Real>(&self, fuel: R) -> R {
         let splat = |value: f32| fuel.broadcast(value);
-        let formed = smoothstep((splat(SOOT_FUEL_RANGE[1]) - fuel) * splat(1.0 / SOOT_FORMATION_WIDTH));
-        let unburnt = smoothstep(fuel * splat(1.0 / SOOT_FUEL_RANGE[0]));
+        let formed = ((splat(SOOT_FUEL_RANGE[1]) - fuel) * splat(1.0 / SOOT_FORMATION_WIDTH)).simd_smoothstep();
+        let unburnt = (fuel * splat(1.0 / SOOT_FUEL_RANGE[0])).simd_smoothstep();
         formed * unburnt.fma(splat(1.0 - self.smoke_fraction), splat(self.smoke_fraction))
     }
 }
@@ -161,13 +161,6 @@ impl CombustionModel {
 #[inline(always)]
 fn relax_implicit<R: Real>(value: R, target: R, rate: R) -> R {
     rate.fma(target, value) / (rate + rate.broadcast(1.0))
-}
-
-/// Cubic smoothstep from 0 to 1.
-#[inline(always)]
-fn smoothstep<R: Real>(x: R) -> R {
-    let x = x.simd_clamp01();
-    x * x * x.fma(x.broadcast(-2.0), x.broadcast(3.0))
 }
 
 /// Time to which the parameters `viscosity` and `conduction` refer, s.
@@ -266,9 +259,9 @@ impl<'a> BatchUpdate<CombustionInputs<'a>, 9> for CombustionStep<'_> {
 
 impl CombustionStep<'_> {
     /// Smooths, burns and cools all particles, and writes the exposure of each to air.
-    pub(crate) fn update_thermochemistry(&self, particles: &mut Particles, air_exposure: &mut Vec<f32>) {
+    pub(crate) fn update_thermochemistry(&self, particles: &mut GasParticles, air_exposure: &mut Vec<f32>) {
         air_exposure.resize(particles.len(), 0.0);
-        let Particles { velocity: [u, v, w], temperature, fuel, soot, support_radius, max_age, .. } = particles;
+        let GasParticles { velocity: [u, v, w], temperature, fuel, soot, support_radius, max_age, .. } = particles;
         let inputs = CombustionInputs {
             position: particles.position.each_ref().map(Vec::as_slice),
             age: &particles.age,

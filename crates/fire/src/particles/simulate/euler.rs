@@ -1,7 +1,7 @@
 //! The paper's algorithm to the letter, section 4.3: `gas_model = "euler"`.
 //!
 //! A step does what the paper lists, in its order: (1) particles are added, (2) their neighbors are found, (3) their densities computed, (4) the
-//! pressure gradient and the external force; then velocities and positions. Mass and temperature are constants given at birth.
+//! pressure gradient and the external force; then velocities and positions. Mass and temperature are constants that a particle gets when it is added.
 //!
 //! The paper leaves open how particles end. It adds a fixed number in every frame and reports about 3000, so the number is held by removing the
 //! oldest: [`EulerStep::remove_oldest`]. It states neither k, rho_0, d, m nor the time step; see [`DerivedConstants`].
@@ -20,7 +20,7 @@ use crate::particles::{
         fluid::FluidSolver,
         integrate::{CLEARANCE, MAX_SPEED, max_acceleration},
         particle_lanes::PARTICLES_PER_TASK,
-        particles::{Particle, Particles},
+        particles::{GasParticles, Particle},
         spawning::ORDINAL_BITS,
     },
 };
@@ -39,7 +39,7 @@ pub(super) struct EulerStep<'a> {
 
 impl EulerStep<'_> {
     /// Advances the particles by one step.
-    pub(super) fn advance(&self, particles: &mut Particles, solver: &mut FluidSolver) {
+    pub(super) fn advance(&self, particles: &mut GasParticles, solver: &mut FluidSolver) {
         self.add_particles(particles);
         self.remove_oldest(particles);
         // Neighbors, density (3), pressure (11), its force (12) and its acceleration (8).
@@ -49,7 +49,7 @@ impl EulerStep<'_> {
     }
 
     /// Step 1: adds the particles of this step, all with the same initial speed, mass and temperature.
-    fn add_particles(&self, particles: &mut Particles) {
+    fn add_particles(&self, particles: &mut GasParticles) {
         for burner in 0..self.constants.burners.len() {
             let [before, after] = [self.time, self.time + self.parameters.step_s].map(|t| self.added_count(burner, t));
             for ordinal in before..after {
@@ -71,7 +71,7 @@ impl EulerStep<'_> {
         (per_step * steps_at_full_flow).round().max(0.0) as u64
     }
 
-    fn add_one(&self, particles: &mut Particles, burner_index: usize, ordinal: u64) {
+    fn add_one(&self, particles: &mut GasParticles, burner_index: usize, ordinal: u64) {
         let (constants, burner) = (self.constants, &self.constants.burners[burner_index]);
         let id = (burner_index as u64) << ORDINAL_BITS | ordinal;
         let spawn_point = burner.spawn_point(self.key, id, self.time);
@@ -92,21 +92,21 @@ impl EulerStep<'_> {
     }
 
     /// Keeps as many particles of each burner as are to be alive at a time, those added last.
-    fn remove_oldest(&self, particles: &mut Particles) {
+    fn remove_oldest(&self, particles: &mut GasParticles) {
         let DerivedConstants { rates, residence_times, .. } = self.constants;
         let first_kept = |(burner, (rate, residence_time)): (usize, (&f64, &f64))| {
             let alive = (rate * residence_time).round().max(1.0) as u64;
             self.added_count(burner, self.time + self.parameters.step_s).saturating_sub(alive)
         };
         let first_kept: Vec<u64> = rates.iter().zip(residence_times).enumerate().map(first_kept).collect();
-        let Particles { id, burner, .. } = &*particles;
+        let GasParticles { id, burner, .. } = &*particles;
         let is_kept = |(id, burner): (&u64, &u32)| id & ((1 << ORDINAL_BITS) - 1) >= first_kept[*burner as usize];
         let keep: Vec<bool> = id.iter().zip(burner).map(is_kept).collect();
         particles.retain(&keep);
     }
 
     /// Removes particles that have left the domain.
-    fn remove_outside(&self, particles: &mut Particles) {
+    fn remove_outside(&self, particles: &mut GasParticles) {
         let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
         let [x, y, z] = particles.positions();
         let is_inside = |index: usize| {
@@ -120,14 +120,16 @@ impl EulerStep<'_> {
     /// Adds the external force of section 4.2.3, the wind as a force per volume, to the acceleration by pressure, eq. (8); then velocity, then position.
     ///
     /// The limits of acceleration and speed only take effect where the step is too long for the gas, so that no scene diverges.
-    fn integrate(&self, particles: &mut Particles, acceleration: [&[f32]; 3], radius: f32) {
-        let Particles { origin, position: [x, y, z], velocity: [u, v, w], density, age, .. } = particles;
+    fn integrate(&self, particles: &mut GasParticles, acceleration: [&[f32]; 3], radius: f32) {
+        let GasParticles { origin, position: [x, y, z], velocity: [u, v, w], density, age, .. } = particles;
         let (origin, seconds) = (*origin, self.parameters.step_s as f32);
         let occluders = &self.surroundings.others.occluders;
         let colliders = Colliders { occluders, origin, clearance: CLEARANCE * radius };
         let max_acceleration = max_acceleration(radius, seconds);
-        (x, y, z, u, v, w, age).into_par_iter().with_min_len(PARTICLES_PER_TASK).enumerate().for_each(
-            |(index, (x, y, z, u, v, w, age))| {
+        let positions = x.par_iter_mut().zip(y).zip(z);
+        let velocities = u.par_iter_mut().zip(v).zip(w);
+        positions.zip(velocities).zip(age).with_min_len(PARTICLES_PER_TASK).enumerate().for_each(
+            |(index, ((((x, y), z), ((u, v), w)), age))| {
                 let position = Vec3::new(*x, *y, *z);
                 let by_pressure =
                     Vec3::from(acceleration.map(|values| values[index])).clamp_length_max(max_acceleration);

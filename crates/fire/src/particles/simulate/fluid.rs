@@ -6,7 +6,7 @@ use bansho_sph::{
     max_stable_step, mixing_weights, substep_count,
 };
 
-use super::{derived::DerivedConstants, particle_lanes::PARTICLES_PER_TASK, particles::Particles};
+use super::{derived::DerivedConstants, particle_lanes::PARTICLES_PER_TASK, particles::GasParticles};
 use crate::particles::parameters::{FluidParameters, NegativePressure};
 
 /// Speed of gas relative to its neighbors, as a fraction of its speed.
@@ -56,14 +56,14 @@ impl FluidSolver {
     ///
     /// Accelerations do not enter the condition: buoyancy and wind accelerate neighbors equally, acceleration by pressure is bounded by the speed of sound,
     /// and the integration limits the remaining ones. If they did, forces of the last step would also have to be part of every snapshot.
-    pub(crate) fn substep_count(&self, particles: &Particles, seconds: f32) -> u32 {
+    pub(crate) fn substep_count(&self, particles: &GasParticles, seconds: f32) -> u32 {
         let [u, v, w] = &particles.velocity;
         let speed_squared = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
         let max_over_particles = |values: &(dyn Fn(usize) -> f32 + Sync)| {
             let tasks = (0..u.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
             let task_max =
                 |first: usize| (first..(first + PARTICLES_PER_TASK).min(u.len())).map(values).fold(0.0, f32::max);
-            tasks.map(task_max).reduce(|| 0.0, f32::max)
+            tasks.map(task_max).reduce_with(f32::max).unwrap_or(0.0)
         };
         let speed = max_over_particles(&speed_squared).sqrt();
         let hottest = max_over_particles(&|index| particles.temperature[index]);
@@ -74,10 +74,10 @@ impl FluidSolver {
 
     /// Sorts the particles and computes density (3), pressure (11) and pressure force (12) for a sub-step of `seconds`; k is
     /// limited such that sound stays within a fifth of d.
-    pub(crate) fn compute_pressure_forces(&mut self, particles: &mut Particles, seconds: f32) {
+    pub(crate) fn compute_pressure_forces(&mut self, particles: &mut GasParticles, seconds: f32) {
         self.air_exposure.resize(particles.len(), 0.0);
         particles.sort(&mut self.cells, &mut self.air_exposure);
-        let Particles { density, temperature, mass, .. } = particles;
+        let GasParticles { density, temperature, mass, .. } = particles;
         compute_densities(&self.cells, KernelShape::Poly6, mass, density);
         let max_sound_speed = 0.2 * self.support_radius() / seconds;
         let (equation_of_state, per_kelvin, max_stiffness) =
@@ -95,7 +95,7 @@ impl FluidSolver {
     }
 
     /// Sums over the neighbors of every particle, which [`compute_pressure_forces`](Self::compute_pressure_forces) has sorted.
-    pub(crate) fn sum_over_neighbors(&mut self, particles: &Particles) {
+    pub(crate) fn sum_over_neighbors(&mut self, particles: &GasParticles) {
         self.neighbor_sums.compute(&self.cells, particles);
     }
 }
@@ -151,8 +151,8 @@ pub(crate) struct NeighborSums {
 }
 
 impl NeighborSums {
-    pub(crate) fn compute(&mut self, cells: &Cells<3>, particles: &Particles) {
-        let Particles { mass, density, temperature, velocity: [u, v, w], .. } = particles;
+    pub(crate) fn compute(&mut self, cells: &Cells<3>, particles: &GasParticles) {
+        let GasParticles { mass, density, temperature, velocity: [u, v, w], .. } = particles;
         mixing_weights(mass, density, &mut self.weights);
         let fields = [&self.weights, u, v, w, temperature].map(Vec::as_slice);
         cells.sum(&NeighborSumsTerm(Poly6::new(cells.support_radius())), fields, self.sums.each_mut());

@@ -11,7 +11,7 @@ use fearless_simd::{Simd, prelude::*};
 use super::{
     collision::Colliders,
     particle_lanes::{BatchUpdate, RowBatch, SharedColumns, for_each_burner_batch},
-    particles::Particles,
+    particles::GasParticles,
 };
 use crate::particles::{
     parameters::WindForce,
@@ -114,8 +114,8 @@ impl<'a> BatchUpdate<IntegrationInputs<'a>, 10> for IntegrationStep<'_> {
 
 impl IntegrationStep<'_> {
     /// Advances velocities, positions and ages.
-    pub(crate) fn advance(&self, particles: &mut Particles) {
-        let Particles { position: [x, y, z], velocity: [u, v, w], drift: [d, e, f], age, .. } = particles;
+    pub(crate) fn advance(&self, particles: &mut GasParticles) {
+        let GasParticles { position: [x, y, z], velocity: [u, v, w], drift: [d, e, f], age, .. } = particles;
         let inputs = IntegrationInputs {
             acceleration: self.acceleration,
             temperature: &particles.temperature,
@@ -269,7 +269,7 @@ mod tests {
             let turbulence = TurbulenceTile::new(key);
             let step = StepConstants { parameters: &parameters, constants: &constants, turbulence: &turbulence, key };
             let around = Surroundings::from_wind(&wind_field);
-            let forces = ExternalForces::new(step, &Particles::default(), &around, 0.0);
+            let forces = ExternalForces::new(step, &GasParticles::default(), &around, 0.0);
             let motion = IntegrationStep {
                 forces: &forces,
                 acceleration: [&[]; 3],

@@ -25,7 +25,7 @@ use crate::particles::{
         },
         integrate::IntegrationStep,
         particle_lanes::PARTICLES_PER_TASK,
-        particles::Particles,
+        particles::GasParticles,
         spawning::Spawner,
     },
 };
@@ -53,7 +53,7 @@ pub(crate) struct Simulation {
     pub(crate) parameters: FlameParticlesParameters,
     pub(crate) turbulence: TurbulenceTile,
     pub(crate) key: Key,
-    pub(crate) particles: Particles,
+    pub(crate) particles: GasParticles,
     solver: FluidSolver,
 }
 
@@ -62,7 +62,7 @@ impl Simulation {
         Self {
             combustion: CombustionModel::from(&parameters.combustion),
             turbulence: TurbulenceTile::new(key),
-            particles: Particles::new(parameters.position.into()),
+            particles: GasParticles::new(parameters.position.into()),
             solver: FluidSolver::new(&parameters.fluid, &constants),
             parameters: parameters.clone(),
             constants: Arc::new(constants),
@@ -135,7 +135,7 @@ impl Simulation {
     /// Removes particles that have reached their maximum age, have left the domain, or are not finite.
     fn remove_expired(&mut self) {
         let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
-        let Particles { position, velocity, temperature, age, max_age, .. } = &self.particles;
+        let GasParticles { position, velocity, temperature, age, max_age, .. } = &self.particles;
         let keep: Vec<bool> = (0..age.len())
             .into_par_iter()
             .with_min_len(PARTICLES_PER_TASK)

@@ -8,12 +8,12 @@ pub(crate) const FLOAT_COLUMNS: usize = 21;
 /// Index of the density column.
 const DENSITY: usize = 14;
 
-/// One particle, for [`Particles::push`] and for tests.
+/// One particle, for [`GasParticles::push`] and for tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Particle {
     /// Unique number within a run; all random numbers of the particle depend on it.
     pub id: u64,
-    /// Position x, m, relative to [`Particles::origin`].
+    /// Position x, m, relative to [`GasParticles::origin`].
     pub position: [f32; 3],
     /// Velocity u, m/s.
     pub velocity: [f32; 3],
@@ -37,7 +37,7 @@ pub struct Particle {
 
 /// All particles, in the order of the cells that they were last sorted into.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Particles {
+pub struct GasParticles {
     /// Origin of positions, m.
     pub origin: DVec3,
     pub(crate) id: Vec<u64>,
@@ -60,7 +60,7 @@ pub struct Particles {
     pub(crate) soot: Vec<f32>,
 }
 
-impl Particles {
+impl GasParticles {
     /// No particles, with positions relative to `origin`.
     pub fn new(origin: DVec3) -> Self {
         Self { origin, ..Self::default() }
@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn removal_keeps_order_and_rows_together() {
-        let mut particles = Particles::new(DVec3::ZERO);
+        let mut particles = GasParticles::new(DVec3::ZERO);
         (1..=5).for_each(|id| particles.push(particle(id)));
         particles.retain(&[true, false, true, false, true]);
         assert_eq!(particles.ids(), [1, 3, 5]);

@@ -9,7 +9,7 @@ use crate::particles::simulate::{
     burner::{Burner, SpawnPoint},
     derived::DerivedConstants,
     forces::turbulence::TurbulenceTile,
-    particles::{Particle, Particles},
+    particles::{GasParticles, Particle},
 };
 
 /// Number of low bits of an id that count the particles of one burner; the high bits are the index of the burner.
@@ -37,7 +37,7 @@ impl Spawner<'_> {
     /// Spawns the particles of the interval from `start` to `start + seconds`, advanced to its end.
     ///
     /// They are counted from the beginning of the preroll, so that each particle is the same for any length of step.
-    pub(crate) fn spawn(&self, particles: &mut Particles, start: f64, seconds: f64) {
+    pub(crate) fn spawn(&self, particles: &mut GasParticles, start: f64, seconds: f64) {
         let constants = self.constants;
         for (burner_index, burner) in constants.burners.iter().enumerate() {
             let [before, after] = [start, start + seconds].map(|t| self.spawned_count(burner_index, burner, t));
@@ -62,7 +62,7 @@ impl Spawner<'_> {
     }
 
     /// Spawns particle `id` at `t`; it has reached `age` at the end of the step.
-    fn spawn_one(&self, particles: &mut Particles, burner_index: usize, id: u64, t: f64, age: f64) {
+    fn spawn_one(&self, particles: &mut GasParticles, burner_index: usize, id: u64, t: f64, age: f64) {
         let (constants, burner) = (self.constants, &self.constants.burners[burner_index]);
         let spawn_point = burner.spawn_point(self.key, id, t);
         let random = uniform(self.key.words(id, 0, Purpose::named("birth speed"))[0]);

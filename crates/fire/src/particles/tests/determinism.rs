@@ -14,7 +14,7 @@ use bansho_base::{
 use super::*;
 use crate::particles::{
     parameters::GasModel,
-    render::{BufferPool, PreparedGas, RenderingParameters},
+    render::{BufferPool, GasRenderingParameters, PreparedGas},
     simulate::snapshot,
 };
 
@@ -32,7 +32,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn compare_numbers_of_threads(gas_model: GasModel) {
     // So many that every part of a step, and of the drawing, is split into several tasks.
     let parameters = FlameParticlesParameters { particles: 30_000, gas_model, ..Default::default() };
-    let rendering = RenderingParameters::default();
+    let rendering = GasRenderingParameters::default();
     let camera = CameraParameters { position: Animated::from([0.0, 0.4, 3.0]), ..CameraParameters::default() };
     let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.04, [256, 192], 0);
     let (wind, buffers) = (Wind::new(WindParameters::default(), 1, None), BufferPool::default());

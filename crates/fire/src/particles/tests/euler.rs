@@ -3,7 +3,10 @@
 use bansho_base::{
     math,
     parameters::{Auto, animated::Animated},
-    phenomenon::{Phenomenon, surroundings::OtherPhenomena},
+    phenomenon::{
+        Phenomenon,
+        surroundings::{OtherPhenomena, PublishedByAll},
+    },
     world::sky::Sky,
 };
 use bansho_sph::KernelShape;
@@ -191,8 +194,9 @@ fn gas_of_a_burner_that_is_turned_off_rises_out_of_the_domain() {
 #[test]
 fn keys_without_effect_are_remarked() {
     let nothing = Publication::default();
-    let published = |_| &nothing;
-    let neighbors = OtherPhenomena { scene: &nothing, count: 1, published: &published, own_index: 0, sky: &Sky::DARK };
+    let all = PublishedByAll::new(vec![Publication::default()]);
+    let published = || &all;
+    let neighbors = OtherPhenomena { scene: &nothing, published: &published, own_index: 0, sky: &Sky::DARK };
     let remark = |parameters: FlameParticlesParameters| {
         let flame = FlameParticles::new(parameters, "flame", 1, None, &MemoryAssets::default()).unwrap();
         flame.remark(&neighbors).map(|remark| remark.key.unwrap())

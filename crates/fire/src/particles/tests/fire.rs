@@ -3,7 +3,7 @@
 use bansho_base::{math, math::curve::Interpolation, parameters::animated::Animated};
 
 use super::*;
-use crate::particles::{heskestad, parameters::BurnerParameters, render::RenderingParameters};
+use crate::particles::{heskestad, parameters::BurnerParameters, render::GasRenderingParameters};
 
 fn fire(heat_release_kw: f64, diameter: f64) -> FlameParticlesParameters {
     FlameParticlesParameters {
@@ -100,23 +100,23 @@ fn wind_bends_the_flame_the_more_the_stronger_it_is() {
 }
 
 #[test]
-fn gas_is_born_where_a_moving_burner_is_and_stays_behind_it() {
+fn gas_is_spawned_where_a_moving_burner_is_and_stays_behind_it() {
     let across = vec![(0.0, [-1.0, 0.0, 0.0]), (0.5, [-1.0, 0.0, 0.0]), (1.0, [1.0, 0.0, 0.0])];
     let mut moved = fire(60.0, 0.3);
     moved.burners[0].position = Animated::keyed(across, Interpolation::Linear).unwrap();
     let mut simulation = simulation(&moved);
-    let mut spawner = 0;
+    let mut spawned = 0;
     World::default().run(&mut simulation, 1.0, |simulation, t| {
         let burner = (4.0 * t - 3.0).clamp(-1.0, 1.0) as f32;
         let particles = &simulation.particles;
-        let newborn = (0..particles.len()).filter(|index| particles.age[*index] <= 2.01 * simulation.step_s() as f32);
-        for index in newborn {
-            spawner += 1;
+        let new = (0..particles.len()).filter(|index| particles.age[*index] <= 2.01 * simulation.step_s() as f32);
+        for index in new {
+            spawned += 1;
             let aside = (position(simulation, index).x - burner).abs();
-            assert!(aside < 0.3, "born {aside} m from the middle at {t}");
+            assert!(aside < 0.3, "spawned {aside} m from the middle at {t}");
         }
     });
-    assert!(spawner > 1000);
+    assert!(spawned > 1000);
     let behind = lit(&simulation).iter().map(|index| position(&simulation, *index).x).fold(f32::INFINITY, f32::min);
     assert!(behind < 0.5, "what it left burns on where it was left: {behind}");
     let [low, high] = simulation.constants.domain;
@@ -151,7 +151,7 @@ fn light_by_height(simulation: &Simulation, of: impl Fn(&Gas, usize) -> f64) -> 
 
 #[test]
 fn blue_light_stands_at_the_base_and_yellow_light_above_it() {
-    let (parameters, rendering) = (fire(60.0, 0.3), RenderingParameters::default());
+    let (parameters, rendering) = (fire(60.0, 0.3), GasRenderingParameters::default());
     let mut simulation = simulation(&parameters);
     let (mut blue, mut yellow, mut high) = ([0.0; 2], [0.0; 2], 0.0);
     World::default().run(&mut simulation, 1.0, |simulation, t| {

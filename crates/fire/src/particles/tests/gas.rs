@@ -12,7 +12,7 @@ use crate::particles::{
     parameters::{BurnerParameters, CombustionParameters, ForceParameters, TemperatureLaw, WindForce},
 };
 
-/// Nothing but pressure and viscosity, and no births.
+/// Only pressure and viscosity act, and no gas is spawned.
 fn quiet() -> FlameParticlesParameters {
     FlameParticlesParameters {
         burners: vec![BurnerParameters { flow: Animated::from(0.0), ..Default::default() }],

@@ -2,6 +2,7 @@
 
 mod determinism;
 mod euler;
+mod exposures;
 mod fire;
 mod gas;
 mod random;

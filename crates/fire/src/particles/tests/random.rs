@@ -51,13 +51,13 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
         assert!(values.iter().all(|value| value.is_finite()), "seed {seed}: not a number");
     }
     let unique_ids = particles.ids().iter().collect::<std::collections::BTreeSet<_>>().len();
-    assert_eq!(unique_ids, particles.len(), "seed {seed}: one birth, two particles");
+    assert_eq!(unique_ids, particles.len(), "seed {seed}: two particles have the same id");
     let [low, high] = constants.domain.map(|corner| corner.as_vec3());
-    // Gas is never colder than air, itself at birth or the inside of its flame, nor hotter than itself at birth or its flame.
-    let born = constants.burners.iter().map(|burner| burner.parameters.temperature_k);
+    // Temperatures stay between the lowest and the highest of the air, the gas when it is spawned, the inside of its flame, and its flame.
+    let spawn_temperatures = constants.burners.iter().map(|burner| burner.parameters.temperature_k);
     let flame = parameters.combustion.flame_temperature_k;
     let (mut coldest, mut hottest) = (Air::default().temperature_k.min(f64::from(INNER_TEMPERATURE) * flame), flame);
-    for kelvin in born {
+    for kelvin in spawn_temperatures {
         (coldest, hottest) = (coldest.min(kelvin), hottest.max(kelvin));
     }
     let most_soot = parameters.combustion.soot_ppm as f32 * 1e-6;

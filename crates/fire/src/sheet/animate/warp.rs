@@ -12,7 +12,7 @@ use fearless_simd::Simd;
 
 use super::{clock::Clock, fluctuation::Fluctuation};
 use crate::sheet::{
-    parameters::{FlameSheetParameters, ShapeParameters},
+    parameters::{FlameSheetParameters, SheetShapeParameters},
     tables::{
         curve_pair::{CurvePair, SEGMENTS, lookup_index},
         shape_tables::ShapeTables,
@@ -30,7 +30,7 @@ pub(crate) struct FlameWaves {
 
 impl FlameWaves {
     /// The fluctuations of a flame of this shape with the random numbers of `key`.
-    pub(crate) fn new(shape: &ShapeParameters, key: Key, clock: &Clock) -> Self {
+    pub(crate) fn new(shape: &SheetShapeParameters, key: Key, clock: &Clock) -> Self {
         let edge_fluctuation = |name| {
             let fit = |waves: f64| clock.waves(waves, 1.0);
             Fluctuation::new(key, Purpose::named(name), shape.flutter_waves, 0.9, fit)

@@ -4,7 +4,7 @@ use bansho_base::{
     camera::upright_quad::UprightQuad,
     color,
     image::Rect,
-    math::{self, DVec3, simd::LANES},
+    math::{self, simd::LANES},
     phenomenon::strip::{AovDescriptor, AovRule, Strip, View},
 };
 use fearless_simd::Simd;
@@ -129,12 +129,15 @@ impl FlameSheet {
     ) -> [f32; 2] {
         let (now, next) = (view.shutter.middle(), view.next_middle);
         let rise = self.gas_speed(flame, x, y, now) * (next - now);
-        let shift: DVec3 = self.base(flame, next) - self.base(flame, now);
+        let shift = self.base_displacement(now, next);
         let bend = warp.center(y + rise) - warp.center(y);
-        let before = view.camera.project(quad.point(x, y));
-        let after = view.camera_at(next).project(quad.point(x + bend, y + rise) + shift);
+        let before = view.camera.project_beyond_circle(quad.point(x, y));
+        let camera = view.camera_at(next);
+        let after = camera.project_beyond_circle(quad.point(x + bend, y + rise) + shift);
         match (before, after) {
-            (Some(before), Some(after)) => (after.pixel - before.pixel).as_vec2().to_array(),
+            (Some(before), Some(after)) => {
+                (camera.nearest_repetition(after.pixel, before.pixel) - before.pixel).as_vec2().to_array()
+            }
             _ => [0.0; 2],
         }
     }
@@ -144,7 +147,7 @@ impl FlameSheet {
         const STEP: f32 = 0.01;
         // A soot field rises uniformly, as the core does.
         let distance = match self.parameters.method {
-            SheetMethod::Texture => equations::axis_distance(x as f32),
+            SheetMethod::FlameTexture => equations::axis_distance(x as f32),
             SheetMethod::SootField => 0.0,
         };
         let y = (y as f32).clamp(0.02, 0.98);

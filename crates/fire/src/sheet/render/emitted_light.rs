@@ -48,9 +48,15 @@ impl FlameSheet {
         fearless_simd::dispatch!(bansho_base::math::simd::level(), simd => row_intensities(simd, self, &state, scale))
     }
 
-    /// Point lights that represent a flame while the shutter is open.
-    pub(crate) fn point_lights(&self, flame: &FlameInstance, shutter: Shutter) -> Vec<Light> {
-        let t = shutter.middle();
+    /// Parts of an exposure in each of which a flame's light hardly moves or flickers.
+    pub(crate) fn light_parts(&self, flame: &FlameInstance, shutter: Shutter) -> usize {
+        let bases = shutter.path_times().map(|t| self.base(flame, t));
+        let path = bases.windows(2).map(|pair| (pair[1] - pair[0]).length()).sum();
+        shutter.light_parts(path, 0.15 * self.sheet_size(flame).x)
+    }
+
+    /// Point lights that represent a flame at `t`.
+    pub(crate) fn point_lights(&self, flame: &FlameInstance, t: f64) -> Vec<Light> {
         if self.is_out(t) {
             return Vec::new();
         }

@@ -2,19 +2,26 @@
 
 use bansho_base::{
     camera::upright_quad::UprightQuad,
-    host::observer::{Cancelled, Observer, check},
+    host::{
+        observer::{Cancelled, Observer, check},
+        scratch_pool::ScratchPool,
+    },
     image::Rect,
+    math::DVec3,
     phenomenon::{
         Prepared,
         strip::{DepthInterval, Strip, View},
         surroundings::Surroundings,
     },
+    world::wind::Wind,
 };
 use fearless_simd::Level;
 
 use super::{
     aovs::{AovContext, write_aov_rows},
+    cells::{CellResolution, SheetCells, small_height},
     draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
+    draw_cells::{CellContext, CellSample, CellSums, TextureCells, draw_cells},
     shade::{SheetContent, TimeSample},
     soot_field::{SootContext, SootSample, draw_soot_rows},
     time_samples::pixels_per_meter,
@@ -22,9 +29,9 @@ use super::{
 use crate::{
     sheet::{
         model::{FlameInstance, FlameSheet},
-        parameters::{SheetMethod, Stage},
+        parameters::{SheetMethod, SheetStage},
     },
-    sparks::{SparkEmitter, Streak},
+    sparks::{SparkEmitter, SparkStreak},
 };
 
 /// A frame, ready to be drawn into strips.
@@ -33,6 +40,8 @@ pub(crate) struct PreparedSheet<'a> {
     view: &'a View,
     level: Level,
     commands: Vec<DrawCommand<'a>>,
+    /// Sums of small sheets.
+    cell_sums: ScratchPool<CellSums, fn() -> CellSums>,
 }
 
 /// A sheet or a spark at one depth.
@@ -49,7 +58,7 @@ enum DrawItem {
     /// Flame and smoke as one field.
     SootField(Vec<SootSample>),
     /// A spark.
-    Spark(Streak),
+    Spark(SparkStreak),
 }
 
 impl<'a> PreparedSheet<'a> {
@@ -66,7 +75,13 @@ impl<'a> PreparedSheet<'a> {
         }
         // A stable sort: at one depth the order is flame, smoke, sparks of each instance.
         commands.sort_by(|a: &DrawCommand, b: &DrawCommand| a.depth.total_cmp(&b.depth));
-        Ok(Self { sheet, view, level: bansho_base::math::simd::level(), commands })
+        Ok(Self {
+            sheet,
+            view,
+            level: bansho_base::math::simd::level(),
+            commands,
+            cell_sums: ScratchPool::new(CellSums::default),
+        })
     }
 }
 
@@ -79,27 +94,34 @@ impl FlameSheet {
         surroundings: &Surroundings,
         commands: &mut Vec<DrawCommand<'a>>,
     ) {
-        let base = self.base(flame, view.shutter.middle());
+        let t = view.shutter.middle();
+        let base = self.base(flame, t);
         let right = self.right(flame, &view.camera, base);
         let quad = UprightQuad::new(base, right, self.sheet_size(flame), 0.0);
         let scale = pixels_per_meter(&view.camera, &quad);
         let count = self.time_samples(flame, view.shutter, scale);
-        let depth = view.camera.depth(quad.point(0.5, 0.5));
+        let depth = self.flame_depth(flame, view);
+        let grid = |texels_up: f64, top: f64| SheetCells::new(&view.camera, &quad, &CellResolution { texels_up, top });
         match self.parameters.method {
-            _ if self.is_out(view.shutter.middle()) => {}
-            SheetMethod::Texture => {
-                let texture = flame.texture_source.filtered(scale * quad.size.y, &self.filter_cache);
-                let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count);
+            _ if self.is_out(t) => {}
+            SheetMethod::FlameTexture => {
+                let texels_up = flame.texture_source.texels_up();
+                let is_flame = self.content() == SheetContent::Flame;
+                let grid = grid(texels_up, if is_flame { self.height_fraction(t).min(1.0) } else { 1.0 });
+                let height_pixels = (scale * quad.size.y).max(grid.map_or(0.0, |_| small_height(texels_up)));
+                let texture = flame.texture_source.filtered(height_pixels, &self.filter_cache);
+                let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count, grid);
                 if !samples.is_empty() {
                     commands.push(DrawCommand { flame, depth, rect, item: DrawItem::Sheet(self.content(), samples) });
                 }
             }
             SheetMethod::SootField => {
-                let (samples, rect) = self.soot_samples(flame, view, surroundings, count);
+                let grid = grid(self.soot_texels_up(flame), 1.0);
+                let (samples, rect) = self.soot_samples(flame, view, surroundings, count, grid);
                 commands.push(DrawCommand { flame, depth, rect, item: DrawItem::SootField(samples) });
             }
         }
-        if self.parameters.stage != Stage::Flame {
+        if self.parameters.stage != SheetStage::Flame {
             return;
         }
         if let Some((sample, rect)) = self.smoke_sample(flame, view, surroundings) {
@@ -109,6 +131,16 @@ impl FlameSheet {
             let rect = streak.bounds(view.size);
             commands.push(DrawCommand { flame, depth: streak.depth, rect, item: DrawItem::Spark(streak) });
         }
+    }
+
+    /// The filtered texture that a flame shares with others in a view: see `TextureSource::shared_table_key`.
+    pub(crate) fn shared_table_key(&self, flame: &FlameInstance, view: &View) -> Option<u64> {
+        let base = self.base(flame, view.shutter.middle());
+        let right = self.right(flame, &view.camera, base);
+        let quad = UprightQuad::new(base, right, self.sheet_size(flame), 0.0);
+        let scale = pixels_per_meter(&view.camera, &quad);
+        let is_drawn = self.parameters.method == SheetMethod::FlameTexture && !self.is_out(view.shutter.middle());
+        flame.texture_source.shared_table_key(scale * quad.size.y).filter(|_| is_drawn)
     }
 
     /// Emitter of the sparks of one instance.
@@ -128,13 +160,26 @@ impl FlameSheet {
         }
     }
 
-    /// Depth interval of a flame and its sparks.
-    pub(crate) fn depth_interval(&self, flame: &FlameInstance, view: &View) -> DepthInterval {
+    /// Depth at which a flame and its smoke are drawn, that of the sheet's middle, m.
+    fn flame_depth(&self, flame: &FlameInstance, view: &View) -> f64 {
         let base = self.base(flame, view.shutter.middle());
-        let size = self.sheet_size(flame);
-        let depth = view.camera.depth(base + bansho_base::math::DVec3::Y * (0.5 * size.y));
-        let half = 0.25 * size.x + if self.parameters.sparks.rate > 0.0 { self.parameters.sparks.swirl } else { 0.0 };
-        DepthInterval { near: (depth - half).max(0.0), far: (depth + half).max(0.0) }
+        view.camera.depth(base + DVec3::Y * (0.5 * self.sheet_size(flame).y))
+    }
+
+    /// Depths at which a flame is drawn, without thickness, so that whatever is nearer hides it and whatever is farther is hidden; and the interval of its
+    /// sparks.
+    pub(crate) fn depths(
+        &self,
+        flame: &FlameInstance,
+        view: &View,
+        wind: &Wind,
+    ) -> impl Iterator<Item = DepthInterval> + use<> {
+        // The same number of intervals for every view: where it moves, those of the parts of an exposure are joined one by one.
+        let depth = self.flame_depth(flame, view).max(0.0);
+        let sheet = DepthInterval { near: depth, far: depth.next_up() };
+        let sparks = (self.parameters.sparks.rate > 0.0)
+            .then(|| self.spark_emitter(flame, view).depths(view, wind).unwrap_or(sheet));
+        std::iter::once(sheet).chain(sparks)
     }
 }
 
@@ -152,11 +197,14 @@ impl Prepared for PreparedSheet<'_> {
             }
             match &command.item {
                 DrawItem::Sheet(content, samples) => self.draw_sheet(command, *content, samples, rect, strip),
+                DrawItem::SootField(samples) if samples.iter().any(|sample| sample.cells.is_some()) => {
+                    self.draw_cells(command, samples, true, rect, strip);
+                }
                 DrawItem::SootField(samples) => {
                     let context = SootContext { sheet: self.sheet, flame: command.flame, view: self.view, samples };
                     fearless_simd::dispatch!(self.level, simd => draw_soot_rows(simd, &context, rect, strip));
                 }
-                DrawItem::Spark(streak) => streak.draw(self.view.size, strip),
+                DrawItem::Spark(streak) => streak.draw(self.view, strip),
             }
         }
     }
@@ -172,6 +220,14 @@ impl PreparedSheet<'_> {
         strip: &mut Strip,
     ) {
         let (sheet, absorbs) = (self.sheet, self.sheet.ramp().absorbs || content == SheetContent::Smoke);
+        if samples.iter().any(|sample| sample.cells.is_some()) {
+            if let [sample] = samples {
+                // Without a list, which every strip would allocate.
+                return self.draw_cells(command, &[TextureCells(sample, content)], absorbs, rect, strip);
+            }
+            let samples: Vec<TextureCells> = samples.iter().map(|sample| TextureCells(sample, content)).collect();
+            return self.draw_cells(command, &samples, absorbs, rect, strip);
+        }
         let row_band = samples.first().map_or(1, |sample| row_band_height(1.0 / f64::from(sample.state.pixel[1])));
         let context = DrawContext {
             shape: sheet.shape(),
@@ -187,5 +243,20 @@ impl PreparedSheet<'_> {
             let context = AovContext { sheet, flame: command.flame, view: self.view, samples, content };
             fearless_simd::dispatch!(self.level, simd => write_aov_rows(simd, &context, rect, strip));
         }
+    }
+
+    /// Draws a sheet that is small in the picture.
+    fn draw_cells<T: CellSample>(
+        &self,
+        command: &DrawCommand,
+        samples: &[T],
+        absorbs: bool,
+        rect: Rect,
+        strip: &mut Strip,
+    ) {
+        let context = CellContext { sheet: self.sheet, flame: command.flame, view: self.view, samples, absorbs };
+        self.cell_sums.with(|sums| {
+            fearless_simd::dispatch!(self.level, simd => draw_cells(simd, &context, rect, sums, strip));
+        });
     }
 }

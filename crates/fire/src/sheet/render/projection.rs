@@ -1,10 +1,10 @@
 //! Mapping from pixels to sheet coordinates, for every lens.
 
 use bansho_base::{
-    camera::{Camera, Lens, upright_quad::UprightQuad},
+    camera::{Camera, Lens, angular_distance::AngularDistance, upright_quad::UprightQuad},
     image::Rect,
     math::{
-        DVec2, DVec3,
+        self, DVec2, DVec3,
         simd::{LANES, Lanes, Real, ramp},
     },
 };
@@ -203,6 +203,9 @@ pub(crate) fn bounds(
     const STEPS: usize = 12;
     let whole = Rect::from_size(picture[0], picture[1]);
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    if let Some(rect) = bounds_around_pole(camera, quad, [left, right, top], picture) {
+        return rect;
+    }
     for i in 0..=STEPS {
         for j in 0..=STEPS {
             let x = left + (right - left) * i as f64 / STEPS as f64;
@@ -223,6 +226,33 @@ pub(crate) fn bounds(
         return Rect::default();
     }
     Rect { x: start[0], y: start[1], width: size[0], height: size[1] }
+}
+
+/// Pixels of a sheet that may contain a pole of a panorama or the antipode of a fisheye, around which its outline does not contain what is within it: those
+/// of a sphere around it. `None` for all others.
+fn bounds_around_pole(
+    camera: &Camera,
+    quad: &UprightQuad,
+    [left, right, top]: [f64; 3],
+    picture: [usize; 2],
+) -> Option<Rect> {
+    let pole = match camera.lens {
+        Lens::Perspective => return None,
+        Lens::Fisheye => camera.world_from_camera.z_axis,
+        Lens::Panorama => camera.world_from_camera.y_axis,
+    };
+    let center = quad.point(0.5 * (left + right), 0.5 * top);
+    let (radius, to_center) = (center.distance(quad.point(right, top)), center - camera.position);
+    let sine = radius / to_center.length();
+    let angle = if sine < 1.0 { math::asin(sine) } else { std::f64::consts::PI };
+    let direction = to_center.normalize_or(DVec3::Z);
+    let along = direction.dot(pole);
+    let along = if camera.lens == Lens::Panorama { along.abs() } else { along };
+    if math::acos(along.clamp(-1.0, 1.0)) > angle {
+        return None;
+    }
+    let rects = AngularDistance::new(camera, direction)?.rects_within(angle, picture);
+    Some(rects.into_iter().fold(Rect::default(), |all, rect| all.union(&rect)))
 }
 
 #[cfg(test)]

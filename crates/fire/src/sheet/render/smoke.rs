@@ -9,6 +9,7 @@ use bansho_base::{
 };
 
 use super::{
+    cells::{CellResolution, ProjectedCells, SheetCells, small_height},
     emitted_light::RowIntensities,
     projection::{PixelToSheet, bounds},
     shade::{
@@ -20,7 +21,7 @@ use super::{
 use crate::sheet::{
     animate::warp::{FlameWaves, WarpState, WindLean},
     model::{FlameInstance, FlameSheet},
-    parameters::ShapeParameters,
+    parameters::SheetShapeParameters,
     texture::{FilteredTexture, FractalLayers},
 };
 
@@ -29,7 +30,7 @@ impl FlameSheet {
     pub(crate) fn smoke_layers(&self, flame: &FlameInstance) -> Option<(FractalLayers, FlameWaves)> {
         let smoke = &self.parameters.smoke;
         (smoke.optical_depth > 0.0).then(|| {
-            let shape = ShapeParameters { flicker: 0.0, sway: 0.08, ..self.parameters.shape.clone() };
+            let shape = SheetShapeParameters { flicker: 0.0, sway: 0.08, ..self.parameters.shape.clone() };
             let layers = FractalLayers::new([1.0, 0.35], smoke.speed, flame.key, &self.clock);
             (layers, FlameWaves::new(&shape, flame.key, &self.clock))
         })
@@ -58,20 +59,26 @@ impl FlameSheet {
         let warp = WarpState::new(&self.parameters, self.shape(), &waves, &self.clock, time, across);
         let pixel_to_sheet = PixelToSheet::new(&view.camera, &quad)?;
         let scale = pixels_per_meter(&view.camera, &quad);
-        let source = FilteredTexture::fractal(layers, scale * plume.y, &self.filter_cache);
         let [low, high] = warp.center_range;
-        let rect = bounds(&view.camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size);
-        let state = SheetState {
-            texture: source.texture(warp.scroll),
-            pixel: [2.0 / (scale * plume.x) as f32, 1.0 / (scale * plume.y) as f32],
-            warp,
+        let sides = [low.min(0.0), 1.0 + high.max(0.0)];
+        let resolution = CellResolution { texels_up: layers.texels_up(), top: 1.0 };
+        let grid = SheetCells::new(&view.camera, &quad, &resolution);
+        let cells = grid.and_then(|grid| ProjectedCells::new(&view.camera, &quad, sides, grid));
+        let (rect, filter_height) = match &cells {
+            Some(cells) => (cells.bounds(view.size), small_height(layers.texels_up()).max(scale * plume.y)),
+            None => (bounds(&view.camera, &quad, sides[0], sides[1], 1.0, view.size), scale * plume.y),
         };
+        let source = FilteredTexture::fractal(layers, filter_height, &self.filter_cache);
+        let pixel = [2.0 / (scale * plume.x) as f32, 1.0 / (scale * plume.y) as f32];
+        let pixel = grid.filter(|_| cells.is_some()).map_or(pixel, |grid| grid.cell());
+        let state = SheetState { texture: source.texture(warp.scroll), pixel, warp };
         let smoke_state = SmokeState {
             optical_depth: (smoke.optical_depth * self.flow_at(t)) as f32,
             base_width: (0.8 / smoke.width).min(1.0) as f32,
             scattered: self.smoke_light(flame, &quad, t, surroundings),
         };
-        Some((TimeSample { pixel_to_sheet, state, quad, luminance: 1.0, smoke: Some(smoke_state) }, rect))
+        let smoke = Some(smoke_state);
+        Some((TimeSample { pixel_to_sheet, state, quad, luminance: 1.0, smoke, cells }, rect))
     }
 
     /// Light that a flame's smoke scatters at each height.

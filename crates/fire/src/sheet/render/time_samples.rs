@@ -10,15 +10,22 @@ use bansho_base::{
 };
 
 use super::{
+    cells::{ProjectedCells, SheetCells},
     projection::{PixelToSheet, bounds},
     shade::{SheetContent, SheetState, TimeSample},
 };
 use crate::sheet::{
     animate::warp::{WarpState, WindLean},
     model::{FlameInstance, FlameSheet},
-    parameters::Stage,
+    parameters::SheetStage,
     texture::FilteredTexture,
 };
+
+/// Motion of the gas between time samples, pixels, and the maximum number of time samples.
+const PIXELS_PER_SAMPLE: f64 = 8.0;
+const MAX_SAMPLES: f64 = 8.0;
+/// Largest motion of the gas that the time samples resolve, pixels.
+pub(crate) const MAX_SCROLL: f64 = PIXELS_PER_SAMPLE * MAX_SAMPLES;
 
 impl FlameSheet {
     /// A flame at `t` with its sheet facing along `right x up`: its quad, which leans with the wind, and its warp.
@@ -40,8 +47,6 @@ impl FlameSheet {
 
     /// Number of time samples of the exposure; by default the gas moves by 8 pixels between them.
     pub(crate) fn time_samples(&self, flame: &FlameInstance, shutter: Shutter, pixels_per_meter: f64) -> usize {
-        const PIXELS_PER_SAMPLE: f64 = 8.0;
-        const MAX_SAMPLES: f64 = 8.0;
         match self.parameters.time_samples {
             Auto::Set(count) => count as usize,
             Auto::Auto => {
@@ -54,13 +59,13 @@ impl FlameSheet {
     /// What is drawn: the flame, or the texture square at a stage.
     pub(crate) fn content(&self) -> SheetContent {
         match self.parameters.stage {
-            Stage::Flame => SheetContent::Flame,
-            Stage::Texture => SheetContent::FlatTexture,
-            Stage::Thresholded | Stage::Sharpened | Stage::Colored => SheetContent::FlatThresholded,
+            SheetStage::Flame => SheetContent::Flame,
+            SheetStage::FlameTexture => SheetContent::FlatTexture,
+            SheetStage::Thresholded | SheetStage::Sharpened | SheetStage::Colored => SheetContent::FlatThresholded,
         }
     }
 
-    /// A flame's time samples over the exposure, and the bounding rectangle of its pixels.
+    /// A flame's time samples over the exposure, and the bounding rectangle of its pixels. The samples of a small sheet have cells, `grid`.
     pub(crate) fn samples(
         &self,
         flame: &FlameInstance,
@@ -68,6 +73,7 @@ impl FlameSheet {
         view: &View,
         wind: &Wind,
         count: usize,
+        grid: Option<SheetCells>,
     ) -> (Vec<TimeSample>, Rect) {
         let mut samples = Vec::with_capacity(count);
         let mut rect = Rect::default();
@@ -78,15 +84,23 @@ impl FlameSheet {
             let (quad, warp) = self.evaluate_at(flame, right, wind, t);
             let Some(pixel_to_sheet) = PixelToSheet::new(&camera, &quad) else { continue };
             let [low, high] = warp.center_range;
-            rect = rect.union(&bounds(&camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
-            let pixels_per_meter = pixels_per_meter(&camera, &quad);
-            let state = SheetState {
-                texture: texture_source.texture(warp.scroll),
-                pixel: [2.0 / (pixels_per_meter * quad.size.x) as f32, 1.0 / (pixels_per_meter * quad.size.y) as f32],
-                warp,
+            let sides = [low.min(0.0), 1.0 + high.max(0.0)];
+            let cells = grid.and_then(|grid| ProjectedCells::new(&camera, &quad, sides, grid));
+            if grid.is_some() && cells.is_none() {
+                // A part of it cannot be projected, as when it is beside or behind the camera.
+                return self.samples(flame, texture_source, view, wind, count, None);
+            }
+            let seen = match &cells {
+                Some(cells) => cells.bounds(view.size),
+                None => bounds(&camera, &quad, sides[0], sides[1], 1.0, view.size),
             };
+            rect = rect.union(&seen);
+            let pixels_per_meter = pixels_per_meter(&camera, &quad);
+            let pixel = [2.0 / (pixels_per_meter * quad.size.x) as f32, 1.0 / (pixels_per_meter * quad.size.y) as f32];
+            let pixel = grid.map_or(pixel, |grid| grid.cell());
+            let state = SheetState { texture: texture_source.texture(warp.scroll), pixel, warp };
             let luminance = self.luminance_at(t) as f32 / count as f32;
-            samples.push(TimeSample { pixel_to_sheet, quad, state, luminance, smoke: None });
+            samples.push(TimeSample { pixel_to_sheet, quad, state, luminance, smoke: None, cells });
         }
         (samples, rect)
     }

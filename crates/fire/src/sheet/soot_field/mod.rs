@@ -15,7 +15,7 @@ use bansho_base::parameters::{ParameterError, ParameterErrorKind};
 use displacement::DisplacementTables;
 use plume::PlumeTables;
 
-use super::parameters::{ColorParameters, FlameSheetParameters, SheetMethod, SootFieldParameters, Stage};
+use super::parameters::{ColorParameters, FlameSheetParameters, SheetMethod, SheetStage, SootFieldParameters};
 
 /// Tables of a soot field, which do not change with time.
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ impl SootFieldTables {
 /// # Errors
 /// A stage of the texture is to be shown, but a soot field has no texture.
 pub(super) fn check(parameters: &FlameSheetParameters) -> Result<(), ParameterError> {
-    if parameters.method == SheetMethod::SootField && parameters.stage != Stage::Flame {
+    if parameters.method == SheetMethod::SootField && parameters.stage != SheetStage::Flame {
         let kind = ParameterErrorKind::NotWith { allowed: "`\"flame\"`", other: "`method` is `\"soot_field\"`" };
         return Err(ParameterError { key: "stage", kind });
     }

@@ -33,7 +33,7 @@ pub(crate) fn half_width(plume: &SootFieldParameters, height: f64) -> f64 {
 
 /// Optical depth through the axis at `height`.
 pub(crate) fn axis_optical_depth(plume: &SootFieldParameters, height: f64) -> f64 {
-    let formed = smoothstep(height / FORMATION_HEIGHT);
+    let formed = math::smoothstep(0.0, 1.0, height / FORMATION_HEIGHT);
     plume.optical_depth * formed * math::pow(plume.base_half_width / half_width(plume, height), plume.dilution)
 }
 
@@ -54,11 +54,6 @@ pub(crate) fn profile(across: f64) -> f64 {
 /// Profile of the excess temperature.
 pub(crate) fn excess_profile(plume: &SootFieldParameters, across: f64) -> f64 {
     math::exp(-plume.edge_cooling * across * across)
-}
-
-fn smoothstep(x: f64) -> f64 {
-    let clamped = x.clamp(0.0, 1.0);
-    clamped * clamped * (3.0 - 2.0 * clamped)
 }
 
 /// Soot at sixteen points.

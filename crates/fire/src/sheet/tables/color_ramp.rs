@@ -13,7 +13,7 @@ use fearless_simd::Simd;
 use crate::{
     chemiluminescence_color,
     sheet::{
-        parameters::{ColorParameters, Coloring, Stage, TextureParameters},
+        parameters::{ColorParameters, Coloring, SheetStage, TextureParameters},
         tables::{curve_pair::CurvePair, shape_tables::from_origin},
     },
 };
@@ -76,8 +76,8 @@ impl ColorParameters {
 }
 
 /// Gray value of a stage before coloring.
-fn stage_value(stage: Stage, t1: f64, t2: f64) -> f64 {
-    if stage == Stage::Sharpened { t2 } else { t1 }
+fn stage_value(stage: SheetStage, t1: f64, t2: f64) -> f64 {
+    if stage == SheetStage::Sharpened { t2 } else { t1 }
 }
 
 impl ColorRamp {
@@ -90,17 +90,17 @@ impl ColorRamp {
     }
 
     /// The table for parameters that were [checked](Self::check).
-    pub(crate) fn new(texture: &TextureParameters, color: &ColorParameters, stage: Stage) -> Self {
+    pub(crate) fn new(texture: &TextureParameters, color: &ColorParameters, stage: SheetStage) -> Self {
         let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
         let scale = luminance_scale(color);
         let light = |t1: f64| {
             let t2 = sharpen.eval(t1);
             match stage {
-                Stage::Flame => {
+                SheetStage::Flame => {
                     let [r, g, b] = unscaled_color(color, t2).map(|value| value * scale);
                     [r, g, b, opacity(color, t2)]
                 }
-                Stage::Colored => {
+                SheetStage::Colored => {
                     let [r, g, b] = unscaled_color(color, t2).map(|value| value * scale);
                     [r, g, b, 1.0]
                 }
@@ -110,7 +110,7 @@ impl ColorRamp {
         Self {
             light: tabulate(light),
             temperature: CurvePair::new(|t1| [temperature(color, sharpen.eval(t1)), 0.0]),
-            absorbs: color.soot_optical_depth > 0.0 || stage != Stage::Flame,
+            absorbs: color.soot_optical_depth > 0.0 || stage != SheetStage::Flame,
             base_blue: chemiluminescence_color().map(|value| value * color.base_blue as f32),
         }
     }

@@ -13,7 +13,7 @@ use fearless_simd::{Simd, prelude::*};
 use super::curve_pair::{CurvePair, SEGMENTS, lookup_index};
 use crate::sheet::{
     equations,
-    parameters::{ColorParameters, Coloring, ShapeParameters, TextureParameters},
+    parameters::{ColorParameters, Coloring, SheetShapeParameters, TextureParameters},
 };
 
 /// Number of bins of height for which the horizontal extent of the flame is tabulated.
@@ -155,13 +155,13 @@ impl ShapeTables {
     ///
     /// # Errors
     /// A curve that must begin at the origin does not, or core and fringe together are wider than the sheet.
-    pub(crate) fn check(shape: &ShapeParameters) -> Result<(), ParameterError> {
+    pub(crate) fn check(shape: &SheetShapeParameters) -> Result<(), ParameterError> {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width")?;
         check_widths(&samples(&shape.core_width, &fringe))
     }
 
     /// Tables for curves that were [checked](Self::check).
-    pub(crate) fn new(shape: &ShapeParameters, texture: &TextureParameters, color: &ColorParameters) -> Self {
+    pub(crate) fn new(shape: &SheetShapeParameters, texture: &TextureParameters, color: &ColorParameters) -> Self {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width");
         let fringe = fringe.unwrap_or_else(|_| shape.fringe_width.clone());
         let width_samples = samples(&shape.core_width, &fringe);

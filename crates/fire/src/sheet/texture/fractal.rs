@@ -14,7 +14,7 @@ use bansho_base::{
     },
 };
 
-use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
+use super::{COLUMNS, FlameTexture, ROWS, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
 
 /// Lattice cells of the first octave along columns and rows; 32 and 64 texels wide.
@@ -188,8 +188,8 @@ impl FractalLayers {
     }
 
     /// The texture after `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
-    pub(crate) fn at(&self, table: &Arc<TextureTable>, scroll: f64) -> Texture {
-        Texture::Mixed(table.clone(), self.layers(scroll))
+    pub(crate) fn at(&self, table: &Arc<TextureTable>, scroll: f64) -> FlameTexture {
+        FlameTexture::Mixed(table.clone(), self.layers(scroll))
     }
 
     /// The mappings of both layers to their table after `scroll` sheet heights.

@@ -3,7 +3,10 @@
 mod fractal;
 mod paper;
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, OnceLock, PoisonError, Weak},
+};
 
 use bansho_base::math::{
     self,
@@ -156,7 +159,7 @@ impl TextureLayer {
 
 /// A texture at one time: T0(u, w), eq. (2).
 #[derive(Clone, Debug)]
-pub(crate) enum Texture {
+pub(crate) enum FlameTexture {
     /// One layer.
     Single(Arc<TextureTable>, TextureLayer),
     /// A coarse and a fine layer, each uniformly distributed over [0, 1], mixed so that the result is uniformly distributed too.
@@ -165,7 +168,7 @@ pub(crate) enum Texture {
     Exact(PaperSum, f64),
 }
 
-impl Texture {
+impl FlameTexture {
     /// Texels per unit of u and of w, of the finer layer; 0 without a table.
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
@@ -201,7 +204,7 @@ pub(crate) enum TextureSource {
 
 impl TextureSource {
     /// Texels of the table per sheet height; 0 without a table.
-    fn texels_up(&self) -> f64 {
+    pub(crate) fn texels_up(&self) -> f64 {
         match self {
             Self::Fractal(layers) => layers.texels_up(),
             Self::Paper(layer) => layer.texels_up(),
@@ -212,12 +215,19 @@ impl TextureSource {
 
 impl TextureSource {
     /// T0 after `scroll` sheet heights, at full resolution.
-    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+    pub(crate) fn texture(&self, scroll: f64) -> FlameTexture {
         match self {
             Self::Fractal(layers) => layers.at(&FRACTAL, scroll),
             Self::Paper(layer) => layer.at(scroll),
-            Self::Exact(sum) => Texture::Exact(*sum, scroll),
+            Self::Exact(sum) => FlameTexture::Exact(*sum, scroll),
         }
+    }
+
+    /// The table in memory that a sheet `height_pixels` tall shares with others; `None` where it uses the unfiltered one, or shares none.
+    pub(crate) fn shared_table_key(&self, height_pixels: f64) -> Option<u64> {
+        let level = math::log2(self.texels_up() / height_pixels.max(1.0)) as f32;
+        let is_filtered = matches!(self, Self::Fractal(_)) && level > 0.0;
+        is_filtered.then(|| u64::from(level.min(MAX_LEVEL as f32).to_bits()))
     }
 
     /// This texture with its table low-pass filtered (as a mip level) for a sheet `height_pixels` tall. Filtered fractals are taken from `cache`.
@@ -238,20 +248,27 @@ impl TextureSource {
 pub(crate) struct FilterCache {
     /// Levels and tables, the newest last.
     recent: Mutex<Vec<(f32, Arc<TextureTable>)>>,
+    /// Number of tables kept.
+    capacity: usize,
 }
 
 impl FilterCache {
-    /// Number of tables kept: those of a few instances, in the picture and in a mirror.
-    const CAPACITY: usize = 4;
+    /// Largest number of tables kept: those of a few instances, in the picture and in a mirror.
+    const MAX_CAPACITY: usize = 4;
+
+    /// The cache of a sheet of some flames.
+    pub(crate) fn new(flames: usize) -> Self {
+        Self { recent: Mutex::default(), capacity: (2 * flames).clamp(1, Self::MAX_CAPACITY) }
+    }
 
     fn filtered_fractal(&self, level: f32) -> Arc<TextureTable> {
         let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
         let known = recent().iter().find(|(known, _)| *known == level).map(|(_, table)| table.clone());
         known.unwrap_or_else(|| {
             // Computed without the lock, so that no thread waits.
-            let table = Arc::new(FRACTAL.filtered(level));
+            let table = shared_filtered_fractal(level);
             let mut recent = recent();
-            if recent.len() >= Self::CAPACITY {
+            while recent.len() >= self.capacity.max(1) {
                 recent.remove(0);
             }
             recent.push((level, table.clone()));
@@ -260,10 +277,29 @@ impl FilterCache {
     }
 }
 
+/// Memory of a table, bytes.
+pub(crate) const TABLE_BYTES: f64 = (ROWS * COLUMNS * size_of::<[f32; 4]>()) as f64;
+
+/// The fractal table at a level, which all sheets of the process share while any of them holds it: a scene may have hundreds of equal flames.
+fn shared_filtered_fractal(level: f32) -> Arc<TextureTable> {
+    static SHARED: Mutex<BTreeMap<u32, Weak<TextureTable>>> = Mutex::new(BTreeMap::new());
+    let shared = || SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = level.clamp(0.0, MAX_LEVEL as f32).to_bits();
+    let known = shared().get(&key).and_then(Weak::upgrade);
+    known.unwrap_or_else(|| {
+        // Computed without the lock: two threads may compute the same table.
+        let table = Arc::new(FRACTAL.filtered(level));
+        let mut shared = shared();
+        shared.retain(|_, table| table.strong_count() > 0);
+        shared.insert(key, Arc::downgrade(&table));
+        table
+    })
+}
+
 impl Clone for FilterCache {
     /// An empty cache.
     fn clone(&self) -> Self {
-        Self::default()
+        Self { recent: Mutex::default(), capacity: self.capacity }
     }
 }
 
@@ -284,11 +320,11 @@ impl FilteredTexture {
     }
 
     /// T0 after `scroll` sheet heights.
-    pub(crate) fn texture(&self, scroll: f64) -> Texture {
+    pub(crate) fn texture(&self, scroll: f64) -> FlameTexture {
         match self {
             Self::Fractal(layers, table) => layers.at(table, scroll),
             Self::Paper(layer) => layer.at(scroll),
-            Self::Exact(sum) => Texture::Exact(*sum, scroll),
+            Self::Exact(sum) => FlameTexture::Exact(*sum, scroll),
         }
     }
 }
@@ -309,6 +345,18 @@ mod tests {
             })
             .collect();
         TextureTable::new(&texels)
+    }
+
+    #[test]
+    fn sheets_share_a_table_while_one_of_them_holds_it() {
+        let (first, second) = (FilterCache::new(1), FilterCache::new(1));
+        let table = first.filtered_fractal(1.25);
+        assert!(Arc::ptr_eq(&table, &second.filtered_fractal(1.25)));
+        assert_eq!(table.texels(), FRACTAL.filtered(1.25).texels());
+        // A sheet of one flame keeps two tables: one of the picture and one of a mirror.
+        [1.5, 1.75, 2.0].iter().for_each(|level| drop(first.filtered_fractal(*level)));
+        assert_eq!(first.recent.lock().unwrap().len(), 2);
+        assert_eq!(FilterCache::new(9).capacity, FilterCache::MAX_CAPACITY);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use bansho_base::math::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use super::{COLUMNS, ROWS, Texture, TextureLayer, TextureTable};
+use super::{COLUMNS, FlameTexture, ROWS, TextureLayer, TextureTable};
 use crate::sheet::animate::clock::Clock;
 
 /// `Fx_0` of eq. (20), radians per unit of p.
@@ -138,7 +138,7 @@ impl PaperLayer {
     }
 
     /// The texture after `scroll` sheet heights, eq. (1).
-    pub(crate) fn at(&self, scroll: f64) -> Texture {
+    pub(crate) fn at(&self, scroll: f64) -> FlameTexture {
         let columns = (COLUMNS as f64 / PERIOD_P) as f32;
         let rows = ROWS as f64 / PERIOD_Q;
         let offset = math::reduce_phase(-self.relative_speed * scroll / PERIOD_Q) * ROWS as f32;
@@ -149,7 +149,7 @@ impl PaperLayer {
             rows_per_w: rows as f32,
             first_row: offset,
         };
-        Texture::Single(self.table.clone(), layer)
+        FlameTexture::Single(self.table.clone(), layer)
     }
 
     /// This layer with its table filtered to `level`.

@@ -1,19 +1,18 @@
 //! Rasterization of a streak into a tile, one column of eight rows at a time.
 
-use bansho_base::math::MulAdd;
+use bansho_base::math::simd::Real;
 
 use super::{
     StreakSegment,
     tile::{TILE_COLUMNS, TILE_ROWS, TileBuffer, TileRows},
 };
-use crate::lanes::{fast_max, fast_min};
 
 /// Cumulative distribution of a disc's area: the fraction left of `t`, for a disc from -1 to 1. The integral of `2
 /// sqrt(1 - t^2) / pi`, which is the streak's profile. A series whose last term is chosen so that it ends at 1; the
 /// error is at most 0.002.
 #[inline(always)]
 fn disc_cdf(t: f32) -> f32 {
-    let t = fast_min(1.0, fast_max(-1.0, t));
+    let t = t.simd_max(-1.0).simd_min(1.0);
     let s = t * t;
     let odd = t * (-0.022_935_f32).fma(s, -0.025).fma(s, -1.0 / 6.0).fma(s, 1.0);
     odd.fma(std::f32::consts::FRAC_2_PI, 0.5)
@@ -70,16 +69,16 @@ impl StreakSegment {
         let (reach, bottom) = (self.reach(), top + TILE_ROWS as f32);
         let [low, high] = if self.steep {
             // Its axis within the rows.
-            let ends = [fast_max(-reach, top), fast_min(reach, bottom)].map(|along| self.slope * along);
-            [fast_min(ends[0], ends[1]) - self.half_width, fast_max(ends[0], ends[1]) + self.half_width]
+            let ends = [top.simd_max(-reach), bottom.simd_min(reach)].map(|along| self.slope * along);
+            [ends[1].simd_min(ends[0]) - self.half_width, ends[1].simd_max(ends[0]) + self.half_width]
         } else {
             /// Below this slope the rows do not bound the columns.
             const MIN_SLOPE: f32 = 1e-3;
             let within = [top - self.half_width, bottom + self.half_width].map(|row| row / self.slope);
-            let [from, to] = [fast_min(within[0], within[1]) - 1.0, fast_max(within[0], within[1]) + 1.0];
-            if self.slope.abs() < MIN_SLOPE { [-reach, reach] } else { [fast_max(-reach, from), fast_min(reach, to)] }
+            let [from, to] = [within[1].simd_min(within[0]) - 1.0, within[1].simd_max(within[0]) + 1.0];
+            if self.slope.abs() < MIN_SLOPE { [-reach, reach] } else { [from.simd_max(-reach), to.simd_min(reach)] }
         };
-        let column_index = |x: f32| fast_min(TILE_COLUMNS as f32, fast_max(0.0, x - left)) as i32 as usize;
+        let column_index = |x: f32| (x - left).simd_max(0.0).simd_min(TILE_COLUMNS as f32) as i32 as usize;
         column_index(low)..column_index(high + 1.0)
     }
 
@@ -108,8 +107,8 @@ impl StreakSegment {
     /// its axis there.
     #[inline(always)]
     fn line_crossing(&self, from: f32, to: f32) -> (f32, f32) {
-        let (from, to) = (fast_max(-self.half_length, from), fast_min(self.half_length, to));
-        (self.line_coverage * fast_max(0.0, to - from), self.slope * 0.5 * (from + to))
+        let (from, to) = (from.simd_max(-self.half_length), to.simd_min(self.half_length));
+        (self.line_coverage * (to - from).simd_max(0.0), self.slope * 0.5 * (from + to))
     }
 }
 
@@ -200,7 +199,7 @@ impl<const STEEP: bool> ColumnCoverage for WideStreak<'_, STEEP> {
             let fraction = disc_cdf((offset + 1.0) * scale) - disc_cdf(offset * scale);
             // Sheared by the slope, a disc becomes an ellipse, whose chords have their centers off the axis.
             let center = -slope * (offset + 0.5) / (slope * slope + 1.0);
-            let chord = fast_max(MIN_HALF_CHORD, self.segment.chord(offset + 0.5));
+            let chord = self.segment.chord(offset + 0.5).simd_max(MIN_HALF_CHORD);
             let covered =
                 covered(along + 1.0 - center, half_length, chord) - covered(along - center, half_length, chord);
             opacities[row] = clamp_opacity(whole * fraction * covered);
@@ -217,7 +216,7 @@ const MIN_HALF_CHORD: f32 = 0.1;
 #[inline(always)]
 fn covered(along: f32, half_length: f32, chord: f32) -> f32 {
     let reach = half_length + chord;
-    let along = fast_min(reach, fast_max(-reach, along));
+    let along = along.simd_max(-reach).simd_min(reach);
     (clamp_integral(along + half_length, chord) - clamp_integral(along - half_length, chord))
         / (4.0 * half_length * chord)
 }
@@ -226,14 +225,14 @@ fn covered(along: f32, half_length: f32, chord: f32) -> f32 {
 #[inline(always)]
 fn clamp_integral(s: f32, chord: f32) -> f32 {
     let magnitude = s.abs();
-    let limit = fast_min(chord, magnitude);
+    let limit = magnitude.simd_min(chord);
     limit * (magnitude - 0.5 * limit)
 }
 
 /// Clamps rounding errors.
 #[inline(always)]
 fn clamp_opacity(value: f32) -> f32 {
-    fast_min(1.0, fast_max(0.0, value))
+    value.simd_clamp01()
 }
 
 #[cfg(test)]

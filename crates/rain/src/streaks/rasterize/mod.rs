@@ -5,7 +5,7 @@ mod packed;
 pub(crate) mod tile;
 
 pub(crate) use packed::PackedStreak;
-use tile::Shading;
+use tile::StreakShading;
 
 use crate::shutter_cameras::PixelBounds;
 
@@ -33,7 +33,7 @@ pub(crate) struct StreakSegment {
     /// Diameter of the drop, mm.
     pub(crate) diameter_mm: f32,
     /// Radiance and depth.
-    pub(crate) shading: Shading,
+    pub(crate) shading: StreakShading,
 }
 
 /// A drop's path in the picture.
@@ -82,7 +82,48 @@ impl StreakSegment {
             half_width,
             line_coverage: blocked_area * 0.5 / half_length,
             diameter_mm,
-            shading: Shading::new(depth),
+            shading: StreakShading::new(depth),
+        }
+    }
+
+    /// The streak of a drop whose disc the lens stretches, without light and diameter: like that of a disc of some `radius` that is spread along its path, the
+    /// vector `travel` about its `center`, and along the vector `widening`, all in pixels.
+    pub(crate) fn stretched(
+        center: [f32; 2],
+        travel: [f32; 2],
+        widening: [f32; 2],
+        radius: f32,
+        blocked_area: f32,
+        depth: f32,
+    ) -> Self {
+        // Variances and covariance of both, times 12.
+        let squares = [0, 1].map(|axis| travel[axis] * travel[axis] + widening[axis] * widening[axis]);
+        let product = travel[0] * travel[1] + widening[0] * widening[1];
+        let steep = squares[1] >= squares[0];
+        let along = if steep { squares[1] } else { squares[0] };
+        let slope = packed::quantize_slope(if along == 0.0 { 0.0 } else { product / along });
+        // The variance across that is left at any position along the major axis.
+        let cross = travel[0] * widening[1] - travel[1] * widening[0];
+        let spread = if along == 0.0 { 0.0 } else { cross * cross / along };
+        let square = radius * radius;
+        let half_width = (square * (slope * slope + 1.0) + (slope * slope + spread) * (1.0 / 3.0)).sqrt();
+        let half_width = packed::round_to_bf16(half_width.max(1e-4));
+        let half_length = if half_width < MIN_WIDE_HALF_WIDTH {
+            (0.5 * (along + 3.0 * square).sqrt()).max(1e-3)
+        } else {
+            // The ends of a wide streak are as soft as it is wide; what that adds to the variance along it is taken from its length.
+            let ends = half_width * half_width / (slope * slope + 1.0) - square;
+            (0.25 * along - 0.75 * ends).max(MIN_HALF_LENGTH * MIN_HALF_LENGTH).sqrt()
+        };
+        Self {
+            center,
+            steep,
+            half_length,
+            slope,
+            half_width,
+            line_coverage: blocked_area * 0.5 / half_length,
+            diameter_mm: 0.0,
+            shading: StreakShading::new(depth),
         }
     }
 
@@ -193,6 +234,57 @@ mod tests {
                 // A drop that does not move is opaque and cannot hide more.
                 let tolerance = if longest < 2.0 * radius { 0.15 } else { 1e-4 };
                 assert!((sum / disc(radius) - 1.0).abs() < tolerance, "{to:?} {radius}: {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_disc_that_is_not_stretched_is_an_ordinary_streak() {
+        for to in [[24.9, 50.0], [50.0, 26.0], [29.0, 52.0], [20.3, 20.9]] {
+            for radius in [0.3, 3.0] {
+                let path = ScreenPath { ends: [[20.3, 20.9], to], radius, blocked_area: disc(radius) };
+                let known = StreakSegment::new(path, 2.0, 0.0);
+                let travel = [0, 1].map(|axis: usize| to[axis] - path.ends[0][axis]);
+                let found = StreakSegment::stretched(known.center, travel, [0.0; 2], radius, disc(radius), 2.0);
+                assert_eq!((known.steep, known.center), (found.steep, found.center));
+                for (known, found) in [
+                    (known.half_length, found.half_length),
+                    (known.half_width, found.half_width),
+                    (known.line_coverage, found.line_coverage),
+                    (1.0 + known.slope, 1.0 + found.slope),
+                ] {
+                    assert!((found / known - 1.0).abs() < 1e-2, "{to:?} {radius}: {known} {found}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_stretched_streak_is_as_large_and_as_wide_as_it_should_be() {
+        for (travel, widening) in
+            [([0.0, 30.0], [6.0, 0.0]), ([3.0, 2.0], [20.0, 0.0]), ([9.0, 9.0], [8.0, -6.0]), ([0.0, 0.0], [5.0, 12.0])]
+        {
+            for radius in [0.3, 2.5] {
+                let area = 0.1 * disc(radius);
+                let segment = StreakSegment::stretched([32.3; 2], travel, widening, radius, area, 2.0);
+                let opacity = drawn(&segment, [64, 64], 0);
+                let moment = |weight: &dyn Fn([f32; 2]) -> f32| -> f32 {
+                    let at = |index: usize| [index % 64, index / 64].map(|count| count as f32 + 0.5 - 32.3);
+                    opacity.iter().enumerate().map(|(index, value)| value / area * weight(at(index))).sum()
+                };
+                assert!((moment(&|_| 1.0) - 1.0).abs() < 0.01, "{travel:?} {widening:?}: {}", moment(&|_| 1.0));
+                // Variances of path, widening, disc and pixel add.
+                for [a, b] in [[0, 0], [0, 1], [1, 1]] {
+                    let own = if a == b { 0.25 * radius * radius + 1.0 / 12.0 } else { 0.0 };
+                    let expected = (travel[a] * travel[b] + widening[a] * widening[b]) / 12.0 + own;
+                    let found = moment(&|place| place[a] * place[b]);
+                    let scale = [travel, widening].as_flattened().iter().map(|side| side * side).sum::<f32>() / 12.0;
+                    let error = (found - expected).abs();
+                    assert!(
+                        error < 0.15 * (scale + radius * radius + 1.0),
+                        "{travel:?} {widening:?} {radius}: {found} {expected}"
+                    );
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use bansho_base::math::approximations;
 
-use super::{StreakSegment, tile::Shading};
+use super::{StreakSegment, tile::StreakShading};
 
 /// A [`StreakSegment`] in 32 bytes, half a cache line. Packing is lossless but for the light (0.4 %) and the diameter
 /// (half a micrometer), since a segment's slope and width are quantized when it is made.
@@ -95,7 +95,7 @@ impl PackedStreak {
             half_width: bf16_to_f32(self.half_width),
             line_coverage: self.line_coverage,
             diameter_mm: f32::from(self.diameter_and_steep & !STEEP_BIT) / UM_PER_MM,
-            shading: Shading { light, depth: self.depth },
+            shading: StreakShading { light, depth: self.depth },
         }
     }
 }

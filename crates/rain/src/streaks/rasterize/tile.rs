@@ -30,14 +30,14 @@ const DEPTH: usize = 4;
 
 /// Light and depth of a streak.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Shading {
+pub(crate) struct StreakShading {
     /// Radiance at full opacity, ACEScg, cd/m^2.
     pub(crate) light: [f32; 3],
     /// m.
     pub(crate) depth: f32,
 }
 
-impl Shading {
+impl StreakShading {
     /// Without light.
     pub(crate) fn new(depth: f32) -> Self {
         Self { light: [0.0; 3], depth }
@@ -121,7 +121,7 @@ impl TileBuffer {
 
     /// Composites a column of opacities under the pixels of the tile, `L += T a l; T -= T a`.
     #[inline(always)]
-    pub(crate) fn composite_under(&mut self, column: usize, opacities: &TileRows, shading: &Shading) {
+    pub(crate) fn composite_under(&mut self, column: usize, opacities: &TileRows, shading: &StreakShading) {
         let Some(pixels) = self.columns.get_mut(column) else { return };
         let mut blocked = [0.0; TILE_ROWS];
         for row in 0..TILE_ROWS {

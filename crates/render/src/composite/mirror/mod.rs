@@ -150,7 +150,7 @@ mod tests {
         host::observer::Unobserved,
         math::random::{Key, Purpose},
         phenomenon::{MirrorRoughness, strip::Shutter},
-        world::sky::{SkyKind, SkyParameters},
+        world::sky::SkyKind,
     };
 
     use super::*;
@@ -284,8 +284,7 @@ mod tests {
         let plate = plate(&view);
         let mirrored = mirrored(&plate, &view.camera, WET, EXPOSURE, 1, &Unobserved).unwrap();
         let mut seen = mirrored.color.clone().unwrap();
-        let parameters = SkyParameters { kind: SkyKind::Uniform, luminance: 300.0.into(), ..SkyParameters::default() };
-        let sky = parameters.at(0.0);
+        let sky = Sky::new(SkyKind::Uniform, 300.0, 7000.0);
         composite_sky(&mut seen, &view.mirrored(0.0), &sky, 1, 0);
         // The lowest row looks 31 degrees down, and by the mirror over the wall and out of the picture.
         let lowest = seen.at(SIZE[0] / 2, SIZE[1] - 1);

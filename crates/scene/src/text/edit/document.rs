@@ -2,7 +2,7 @@
 
 use toml_edit::{DocumentMut, Value};
 
-use crate::{FORMAT, text::toml};
+use crate::text::toml;
 
 /// Why an edit is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,12 +37,6 @@ pub enum EditError {
         path: String,
         /// The time, s.
         time: f64,
-    },
-    /// The scene's format is newer than this version.
-    #[error("format {found} is newer than this program knows; known: up to {FORMAT}")]
-    NewerFormat {
-        /// The scene's format.
-        found: i64,
     },
 }
 

@@ -1,9 +1,8 @@
-//! Edits of a scene's text that keep its comments: `--set`, operations of editors, and `bansho upgrade`.
+//! Edits of a scene's text that keep its comments: `--set`, and operations of editors.
 
 mod document;
 pub mod operation;
 mod set;
 mod suggest_path;
-mod upgrade;
 
-pub use self::{document::EditError, set::set, upgrade::upgrade};
+pub use self::{document::EditError, set::set};

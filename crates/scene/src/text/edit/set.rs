@@ -6,23 +6,23 @@ use super::{
     document::{EditError, check_edited, parse_document, replace_value},
     suggest_path::suggest_paths,
 };
-use crate::{PhenomenonKind, SHARED_TABLES};
+use bansho_base::tables::{self, TableKind};
 
 /// Applies `assignment`, in the form `key.path=value`, to a scene's text.
 ///
 /// The value is TOML; a bare word is a string. A number or a name selects a table of a list (`rain.0.rate_mm_per_h`,
 /// `flame_sheet.left log.height`, `flame_particles.0.burners.2.speed`); without it, the assignment applies to all of them. `kinds` are the
-/// phenomena that a scene may contain.
+/// tables that a scene may contain.
 ///
 /// # Errors
 /// The text is not TOML, the assignment is malformed, or the path does not exist.
-pub fn set(text: &str, assignment: &str, kinds: &[PhenomenonKind]) -> Result<String, EditError> {
+pub fn set(text: &str, assignment: &str, kinds: &[TableKind]) -> Result<String, EditError> {
     let mut document = parse_document(text)?;
     let (path, value) = split(assignment)?;
     let value = parse_value(value);
     let segments: Vec<&str> = path.split('.').map(str::trim).collect();
     let root = document.as_table_mut();
-    ensure_shared_table(root, &segments);
+    ensure_shared_table(root, &segments, kinds);
     let is_known = if segments.len() > 1 { root.contains_key(segments[0]) } else { is_root_key(segments[0], kinds) };
     if !is_known {
         let (path, segment, available) = (path.to_owned(), segments[0].to_owned(), keys(root));
@@ -57,12 +57,12 @@ fn parse_value(text: &str) -> Value {
 }
 
 /// Whether a scene may have this key at its root.
-fn is_root_key(key: &str, kinds: &[PhenomenonKind]) -> bool {
-    key == "bansho" || SHARED_TABLES.iter().any(|table| table.key == key) || kinds.iter().any(|kind| kind.key == key)
+fn is_root_key(key: &str, kinds: &[TableKind]) -> bool {
+    key == "bansho" || tables::find(kinds, key).is_some()
 }
 
-fn ensure_shared_table(root: &mut Table, segments: &[&str]) {
-    let shared = SHARED_TABLES.iter().any(|table| !table.is_list && table.key == segments[0]);
+fn ensure_shared_table(root: &mut Table, segments: &[&str], kinds: &[TableKind]) {
+    let shared = tables::find(kinds, segments[0]).is_some_and(|kind| !kind.is_list());
     if shared && segments.len() > 1 && !root.contains_key(segments[0]) {
         root.insert(segments[0], Item::Table(Table::new()));
     }

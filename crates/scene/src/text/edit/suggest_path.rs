@@ -1,24 +1,23 @@
 //! Suggests existing paths for a path that does not exist in a scene.
 
-use bansho_base::parameters::{Kind, Table, TableDescriptor, Value, nearest};
+use bansho_base::{
+    parameters::{Kind, Table, TableDescriptor, Value, nearest},
+    tables::{self, TableCount, TableKind},
+};
 
-use crate::{PhenomenonKind, SHARED_TABLES, text::toml};
+use crate::text::toml;
 
 /// Maximum number of suggestions.
 const MAX_SUGGESTIONS: usize = 3;
 
-/// Tables that every scene has, even if its text does not contain them.
-const IMPLICIT_TABLES: [&str; 4] = ["picture", "camera", "wind", "air"];
-
 /// Paths of the scene `text` that are similar to the path `segments`, the most likely first: parameters with the same name in tables that the
 /// scene has, else the parameter with the most similar name.
-pub(super) fn suggest_paths(text: &str, segments: &[&str], kinds: &[PhenomenonKind]) -> Vec<String> {
+pub(super) fn suggest_paths(text: &str, segments: &[&str], kinds: &[TableKind]) -> Vec<String> {
     let Ok(root) = toml::parse(text) else { return Vec::new() };
     let known = known_paths(&root, kinds);
     let (first, rest) = (segments[0], &segments[1..]);
-    let tables = kinds.iter().map(|kind| kind.key).chain(SHARED_TABLES.iter().map(|table| table.key));
-    let tables = tables.filter(|key| root.get(key).is_some() || IMPLICIT_TABLES.contains(key));
-    if let Some(table) = nearest(first, tables).filter(|_| !rest.is_empty()) {
+    if let Some(table) = nearest(first, tables_of_scene(&root, kinds).map(|kind| kind.key)).filter(|_| !rest.is_empty())
+    {
         return vec![format!("{table}.{}", rest.join("."))];
     }
     let paths_ending_with = |segments: &[&str]| -> Vec<String> {
@@ -39,15 +38,18 @@ pub(super) fn suggest_paths(text: &str, segments: &[&str], kinds: &[PhenomenonKi
     suggestions
 }
 
-/// Paths of all parameters of the tables that a scene has, its phenomena first.
-fn known_paths(root: &Table, kinds: &[PhenomenonKind]) -> Vec<Vec<&'static str>> {
+/// The kinds of the tables that a scene has, its phenomena first. It has some even if its text does not contain them.
+fn tables_of_scene<'a>(root: &Table, kinds: &'a [TableKind]) -> impl Iterator<Item = &'a TableKind> {
+    let all = tables::phenomena(kinds).chain(tables::shared(kinds));
+    all.filter(|kind| root.get(kind.key).is_some() || kind.count == TableCount::One)
+}
+
+/// Paths of all parameters of the tables that a scene has.
+fn known_paths(root: &Table, kinds: &[TableKind]) -> Vec<Vec<&'static str>> {
     let mut known = Vec::new();
-    let kinds = kinds.iter().map(|kind| (kind.key, kind.table));
-    for (key, table) in kinds.chain(SHARED_TABLES.iter().map(|shared| (shared.key, shared.table))) {
-        let stated: Vec<&Value> = root.get(key).map(|node| &node.value).into_iter().collect();
-        if !stated.is_empty() || IMPLICIT_TABLES.contains(&key) {
-            add_parameters(&mut known, &[key], table(), &stated);
-        }
+    for kind in tables_of_scene(root, kinds) {
+        let stated: Vec<&Value> = root.get(kind.key).map(|node| &node.value).into_iter().collect();
+        add_parameters(&mut known, &[kind.key], (kind.table)(), &stated);
     }
     known
 }

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use bansho::{
-    KINDS,
     base::parameters::{Table, Value},
+    phenomena,
     scene::{ValuePath, operation::Operation},
 };
 
 use crate::{
-    document::{PhenomenonId, descriptors},
+    document::{PhenomenonId, editor_hints::editor_hints},
     editors,
     session::{Session, folder, selection::Selection},
 };
@@ -35,8 +35,8 @@ impl Session {
         Value::Text(relative.to_string_lossy().replace('\\', "/"))
     }
 
-    /// Adds a dropped file to the scene: to the selected phenomenon where an editor or a [`MeshImport`](bansho::base::phenomenon::editor_hints::MeshImport) of its kind takes the file, and a
-    /// picture as the plate.
+    /// Adds a dropped file to the scene: to the selected phenomenon if an editor or a
+    /// [`MeshImport`](crate::document::editor_hints::MeshImport) of its kind takes the file, and a picture as the plate.
     pub(super) fn drop_file(&mut self, file: &Path, selection: &Selection) {
         let extension = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         // A file of the same name may have been read before.
@@ -61,14 +61,12 @@ impl Session {
     /// Adds the mesh file that the scene calls `name` to the selected phenomenon, or to the first whose kind takes meshes.
     fn add_mesh(&mut self, selection: &Selection, name: Value) {
         let selected = selection.phenomenon().into_iter();
-        let first_of_kinds = KINDS.iter().map(|kind| PhenomenonId { kind: kind.key, index: 0 });
-        let import = |phenomenon: PhenomenonId| {
-            Some((phenomenon.path(), descriptors::phenomenon_kind(phenomenon.kind)?.editor_hints.mesh_import?))
-        };
+        let first_of_kinds = phenomena().map(|kind| PhenomenonId { kind: kind.key, index: 0 });
+        let import = |phenomenon: PhenomenonId| Some((phenomenon.path(), editor_hints(phenomenon.kind).mesh_import?));
         let is_stated = |path: &ValuePath| path.find(self.document.values()).is_some();
         let mut imports = selected.chain(first_of_kinds).filter_map(import);
         let Some((path, import)) = imports.find(|(path, _)| is_stated(path)) else {
-            let kinds = KINDS.iter().filter(|kind| kind.editor_hints.mesh_import.is_some()).map(|kind| kind.key);
+            let kinds = phenomena().filter(|kind| editor_hints(kind.key).mesh_import.is_some()).map(|kind| kind.key);
             let kinds = kinds.collect::<Vec<_>>().join(" or ");
             self.set_notice(Some(format!("a mesh is added to a {kinds}, which this scene lacks: add one first")));
             return;

@@ -2,8 +2,12 @@
 
 use bansho::{
     KINDS,
-    base::parameters::{Table, Value},
-    scene::{SHARED_TABLES, ValuePath, operation::Operation},
+    base::{
+        parameters::{Table, Value},
+        tables,
+    },
+    phenomena,
+    scene::{ValuePath, operation::Operation},
 };
 
 use crate::{
@@ -23,10 +27,10 @@ pub(crate) fn scene_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selec
         ui.push_id((entry.id.kind, entry.id.index), |ui| phenomenon_ui(ui, session, selection, &entry));
     }
     ui.separator();
-    for shared in SHARED_TABLES.iter().filter(|table| !table.is_list) {
+    for shared in tables::shared(KINDS).filter(|kind| !kind.is_list()) {
         row_ui(ui, selection, Selection { key: shared.key, index: None }, shared.key);
     }
-    for shared in SHARED_TABLES.iter().filter(|table| table.is_list) {
+    for shared in tables::shared(KINDS).filter(|kind| kind.is_list()) {
         let count = match session.document.values().get(shared.key).map(|node| &node.value) {
             Some(Value::List(items)) => items.len(),
             _ => 0,
@@ -54,7 +58,7 @@ fn row_ui(ui: &mut Ui, selection: &mut Selection, own: Selection, text: &str) ->
 
 fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
     ui.menu_button("Add", |ui| {
-        for kind in KINDS {
+        for kind in phenomena() {
             if ui.button(kind.key).on_hover_text((kind.table)().doc.as_str()).clicked() {
                 let index = session.document.phenomena().iter().filter(|entry| entry.id.kind == kind.key).count();
                 let add = operations::add(&session.document, kind.key);
@@ -64,7 +68,7 @@ fn add_menu_ui(ui: &mut Ui, session: &mut Session, selection: &mut Selection) {
             }
         }
         ui.separator();
-        for shared in SHARED_TABLES.iter().filter(|table| table.is_list) {
+        for shared in tables::shared(KINDS).filter(|kind| kind.is_list()) {
             if ui.button(shared.key).on_hover_text((shared.table)().doc.as_str()).clicked() {
                 let path = ValuePath::root().key(shared.key);
                 session.edit("add", &[Operation::Append { path, value: Value::Table(Table::default()) }]);

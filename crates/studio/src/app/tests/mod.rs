@@ -262,7 +262,8 @@ fn lamps_are_dragged() {
     drag(&mut harness, lamp, vec2(80.0, 0.0));
     let edited = text(&mut harness);
     let plan = harness.state_mut().session().plan().unwrap().clone();
-    let [x, y, z] = plan.scene().lights[0].position.at(0.0);
+    let light: &bansho::LightParameters = plan.scene().tables.get().unwrap();
+    let [x, y, z] = light.position.at(0.0);
     assert!(x > 0.1 && (y - 1.0).abs() < 0.02 && z.abs() < 0.02, "to the right, at its depth: {edited}");
 }
 

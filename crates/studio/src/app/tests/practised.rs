@@ -1,4 +1,4 @@
-//! The time that a practised user needs for scene 2 of the thesis, an S that splits, starting from the default flame.
+//! The time that a practiced user needs for scene 2 of the thesis, an S that splits, starting from the default flame.
 
 use eframe::egui::{Pos2, pos2};
 use egui_kittest::{Harness, kittest::Queryable};
@@ -9,7 +9,7 @@ use crate::{editors::aurora::document::AuroraDrawing, scenes::new_scene::FLAME_S
 /// Times of the keystroke-level model, s (Card, Moran and Newell, "The keystroke-level model for user performance time with interactive
 /// systems", 1980): mental preparation, pointing, pressing or releasing a button, and drawing, for each line of a stroke
 /// and each centimeter of it. A step that the previous one prepared needs no mental preparation: the entries of an open menu, the position
-/// at which a chosen tool is applied. The model is of practised users who make no errors; the time of new users has to be measured.
+/// at which a chosen tool is applied. The model is of practiced users who make no errors; the time of new users has to be measured.
 const THINK_S: f64 = 1.35;
 const POINT_S: f64 = 1.1;
 const BUTTON_S: f64 = 0.1;
@@ -20,7 +20,7 @@ const SEEKING: f64 = 3.0;
 /// Points per centimeter, at 96 points per inch.
 const CENTIMETER: f32 = 96.0 / 2.54;
 
-/// A simulated practised user.
+/// A simulated practiced user.
 struct User {
     harness: Harness<'static, Studio>,
     thoughts: usize,
@@ -85,7 +85,7 @@ impl User {
 }
 
 #[test]
-fn a_practised_user_makes_an_s_that_splits_in_less_than_a_minute() {
+fn a_practiced_user_makes_an_s_that_splits_in_less_than_a_minute() {
     let mut user = User { harness: window(FLAME_SHEET), thoughts: 0, seconds: 0.0 };
     user.think();
     user.click("File");

@@ -1,6 +1,7 @@
 //! Handles in the viewport: positions that can be dragged, of lamps, flames and their burners.
 
 use bansho::{
+    LightParameters,
     base::{
         math::DVec3,
         parameters::{Table, Value},
@@ -9,7 +10,7 @@ use bansho::{
 };
 
 use crate::{
-    document::{descriptors, keyframes},
+    document::{editor_hints::editor_hints, keyframes},
     session::Session,
 };
 
@@ -38,7 +39,7 @@ pub(super) fn handles(session: &Session) -> Vec<Handle> {
 fn positioned_handles(session: &Session) -> Vec<Handle> {
     let Some(plan) = session.plan() else { return Vec::new() };
     let time = session.transport.time_s();
-    let lights = plan.scene().lights.iter().enumerate().filter(|(_, light)| light.has_position());
+    let lights = plan.scene().tables.all::<LightParameters>().enumerate().filter(|(_, light)| light.has_position());
     let mut handles: Vec<Handle> = lights
         .map(|(index, light)| Handle {
             path: ValuePath::root().key("light").index(index).key("position"),
@@ -49,12 +50,11 @@ fn positioned_handles(session: &Session) -> Vec<Handle> {
         .collect();
     let root = session.document.values();
     for entry in session.document.phenomena() {
-        let kind = descriptors::phenomenon_kind(entry.id.kind);
-        let Some(hints) = kind.and_then(|kind| kind.editor_hints.position_handles) else { continue };
+        let Some(hints) = editor_hints(entry.id.kind).position_handles else { continue };
         let own = entry.id.path().key(hints.key);
         let origin = position(root, &own, time);
         handles.push(Handle { path: own, origin: DVec3::ZERO, point: origin, name: entry.name.clone() });
-        let Some(items) = hints.items else { continue };
+        let items = hints.items;
         let list = entry.id.path().key(items);
         let count = match list.find(root).map(|node| &node.value) {
             Some(Value::List(items)) => items.len(),

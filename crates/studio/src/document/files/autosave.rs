@@ -3,12 +3,15 @@
 //! Each running studio holds a file lock, so that the work of running studios is not offered.
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs::{self, File, OpenOptions, TryLockError},
     io,
     path::{Path, PathBuf},
 };
 
-use bansho::media::{MediaError, files::atomic};
+use bansho::media::{
+    MediaError,
+    files::{atomic, overwrite_policy::OverwritePolicy},
+};
 
 use crate::document::Document;
 
@@ -59,7 +62,8 @@ impl Autosave {
         for number in 0..MAX_SESSIONS {
             let lock = folder.join(format!("{session}-{number}.lock"));
             let existed = lock.exists();
-            let lock_file = File::create(&lock)?;
+            // What has this name, perhaps by a link, keeps its contents.
+            let lock_file = OpenOptions::new().write(true).create(true).truncate(false).open(&lock)?;
             match try_lock(&lock_file) {
                 Ok(()) if !lock.with_extension("toml").exists() => {
                     return Ok(Self { file: lock.with_extension("toml"), lock, _lock: lock_file });
@@ -89,7 +93,8 @@ impl Autosave {
             return Ok(());
         }
         let origin = origin.map(|path| path.display().to_string()).unwrap_or_default();
-        atomic::write_bytes(&self.file, encode(&origin, document.text()).as_bytes())
+        let policy = OverwritePolicy::any().without_links();
+        atomic::write_bytes(&self.file, encode(&origin, document.text()).as_bytes(), &policy)
     }
 
     /// Removes the stored work and the lock when the studio closes.

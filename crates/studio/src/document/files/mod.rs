@@ -12,7 +12,10 @@ use std::{
 
 use bansho::{
     job::{JobError, SceneFile},
-    media::{MediaError, files::atomic},
+    media::{
+        MediaError,
+        files::{atomic, overwrite_policy::OverwritePolicy},
+    },
 };
 
 use super::Document;
@@ -44,7 +47,8 @@ pub fn open(path: &Path) -> Result<Document, OpenError> {
 /// # Errors
 /// The file cannot be written. A previous file and the document are unchanged then.
 pub fn save(document: &mut Document, path: &Path, text: Arc<str>) -> Result<(), MediaError> {
-    atomic::write_bytes(path, text.as_bytes())?;
+    // The user has chosen this file, and was asked where another program had changed it.
+    atomic::write_bytes(path, text.as_bytes(), &OverwritePolicy::any())?;
     if text != *document.text() {
         document.end_step();
         document.replace("paths", &text);
@@ -90,7 +94,7 @@ pub fn write_to_free_name(named: impl Fn(&str) -> PathBuf, bytes: &[u8]) -> Resu
     let mut file = named("");
     for number in 2..=MAX_NUMBERED_FILES {
         if fs::symlink_metadata(&file).is_err() {
-            atomic::write_bytes(&file, bytes)?;
+            atomic::write_new(&file, bytes)?;
             return Ok(file);
         }
         if fs::read(&file).is_ok_and(|content| content == bytes) {
@@ -158,6 +162,7 @@ impl RecentFiles {
         self.paths.truncate(MAX_RECENT_FILES);
         let Some(file) = &self.file else { return Ok(()) };
         let lines: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
-        atomic::write_bytes(file, (lines.join("\n") + "\n").as_bytes())
+        let policy = OverwritePolicy::any().without_links();
+        atomic::write_bytes(file, (lines.join("\n") + "\n").as_bytes(), &policy)
     }
 }

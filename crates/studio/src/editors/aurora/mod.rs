@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use bansho::{
     aurora::{AuroraParameters, shapes::Form},
-    base::{parameters::Value, phenomenon::kind::Describe},
+    base::parameters::Value,
     scene::operation::Operation,
 };
 
@@ -46,7 +46,7 @@ pub(crate) struct AuroraEditor {
 
 impl AuroraEditor {
     /// The kind of phenomenon that it edits.
-    pub(crate) const KIND: &'static str = AuroraParameters::KEY;
+    pub(crate) const KIND: &'static str = AuroraParameters::KIND.key;
 
     /// Shows the editor of aurora `index`.
     pub(crate) fn ui(&mut self, ui: &mut Ui, session: &mut Session, index: usize) {

@@ -4,7 +4,7 @@ use bansho::base::math::DVec2;
 
 use super::{
     AuroraEditor,
-    document::{AuroraDrawing, Factor, LinkedPoint, SheetEnd, SheetPosition},
+    document::{AuroraDrawing, Factor, LinkedPoint, SheetPosition, StrokeEnd},
     plane::{Plane, Side},
     pointer::DragState,
     tool::DrawTool,
@@ -149,7 +149,7 @@ impl AuroraEditor {
         for (number, sheet) in drawing.lines(source).iter().enumerate() {
             for (last, point) in [(false, sheet.first()), (true, sheet.last())] {
                 let Some(&point) = point else { continue };
-                let chosen = self.drag == DragState::MergeFrom(SheetEnd { sheet: number, last });
+                let chosen = self.drag == DragState::MergeFrom(StrokeEnd { sheet: number, last });
                 let color = if chosen { SELECTED } else { SHEET };
                 painter.circle(plane.to_screen(point), 6.0, BACKGROUND, Stroke::new(2.0, color));
             }

@@ -4,7 +4,7 @@ use bansho::base::math::DVec2;
 
 use super::{
     AuroraEditor,
-    document::{AuroraDrawing, Factor, SheetEnd, SheetPosition},
+    document::{AuroraDrawing, Factor, SheetPosition, StrokeEnd},
     plane::{Plane, Side},
     tool::DrawTool,
 };
@@ -22,7 +22,7 @@ pub(super) enum DragState {
     /// A dragged control point: the indices of its sheet and of the point on it.
     MovePoint { sheet: usize, point: usize },
     /// The first of two ends to merge.
-    MergeFrom(SheetEnd),
+    MergeFrom(StrokeEnd),
     /// A link from a position on the source to a sheet of the target: the whole sheet is linked, or only the point.
     Linking { from: SheetPosition, point_alone: bool, at: Pos2 },
 }
@@ -186,10 +186,10 @@ impl AuroraEditor {
     fn merge(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
         let Some(all) = self.source(drawing, pointer) else { return };
         let ends = all.iter().enumerate().flat_map(|(sheet, line)| {
-            let end = |last: bool| SheetEnd { sheet, last };
+            let end = |last: bool| StrokeEnd { sheet, last };
             [(line.first().copied(), end(false)), (line.last().copied(), end(true))]
         });
-        let near = |(point, end): (Option<DVec2>, SheetEnd)| Some((point?.distance(pointer.point()), end));
+        let near = |(point, end): (Option<DVec2>, StrokeEnd)| Some((point?.distance(pointer.point()), end));
         let nearest = ends.filter_map(near).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, end)) = nearest.filter(|near| near.0 < pointer.hit_radius(self.tool)) else {
             if pointer.sheet_near(&all, self.tool).is_some() {

@@ -4,13 +4,14 @@ mod any_lens;
 mod perspective;
 
 use any_lens::AnyLensProjector;
-use bansho_base::{host::parallel::prelude::*, phenomenon::strip::View};
+use bansho_base::host::parallel::prelude::*;
 use fearless_simd::dispatch;
 use perspective::PerspectiveProjector;
 
 use crate::particles::render::{
     buffer_pool::PooledVec,
     gas::{Gas, PARTICLES_PER_TASK},
+    gas_view::GasView,
     splat::Ellipse,
 };
 
@@ -26,9 +27,6 @@ pub(crate) struct ProjectedParticle {
     pub(crate) scale: f32,
 }
 
-/// Sprites with coordinates beyond this are discarded, pixels.
-const MAX_PIXEL_COORDINATE: f64 = 1e6;
-
 /// Variance of a pixel's footprint, pixels^2, that is added to every sprite (as in EWA splatting), so that small sprites neither flicker nor vanish.
 const PIXEL_FOOTPRINT: f64 = 0.18;
 
@@ -42,11 +40,11 @@ pub(crate) trait SpriteKind: Sync {
 /// Records of all included particles that are visible in a view, in order, one list per task.
 pub(crate) fn project_particles<'a, K: SpriteKind>(
     gas: &Gas<'a>,
-    view: &View,
+    view: &GasView,
     kind: &K,
 ) -> Vec<PooledVec<'a, K::Record>> {
-    let projector = AnyLensProjector::new(view);
-    let perspective = PerspectiveProjector::new(gas, view, &projector.next, projector.shutter_fraction);
+    let projector = AnyLensProjector { view };
+    let perspective = PerspectiveProjector::new(gas, view);
     let (count, level) = (gas.particles.len(), bansho_base::math::simd::level());
     let of_task = |task: usize| {
         let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
@@ -76,12 +74,12 @@ mod tests {
             random::{Key, Purpose},
         },
         parameters::animated::Animated,
-        phenomenon::strip::Shutter,
+        phenomenon::strip::{Shutter, View},
     };
 
     use super::*;
     use crate::particles::{
-        Particle, Particles,
+        GasParticles, Particle,
         render::{buffer_pool::BufferPool, gas::FadeOut},
     };
 
@@ -109,7 +107,7 @@ mod tests {
             ..CameraParameters::default()
         };
         let view = View::new(camera, Shutter { open: 1.0, close: 1.02 }, 1.04, [320, 180], 0);
-        let mut particles = Particles::new(DVec3::new(0.1, -0.2, 0.05));
+        let mut particles = GasParticles::new(DVec3::new(0.1, -0.2, 0.05));
         for id in 0..333 {
             let random = Key::new(5, "seen").uniforms(id, 0, Purpose::named("place")).map(|u| 4.0 * (u - 0.5));
             let [x, y, z, w] = random;
@@ -138,7 +136,8 @@ mod tests {
             fade_out: FadeOut::NEVER,
             buffers: &BufferPool::default(),
         };
-        let (projector, mut one_by_one) = (AnyLensProjector::new(&view), Vec::new());
+        let view = GasView::new(&view);
+        let (projector, mut one_by_one) = (AnyLensProjector { view: &view }, Vec::new());
         (0..particles.len()).for_each(|index| projector.project(&gas, index, |projected| one_by_one.push(projected)));
         let projected = project_particles(&gas, &view, &Everything);
         let together: Vec<ProjectedParticle> = projected.iter().flat_map(|task| task.iter().copied()).collect();

@@ -1,49 +1,60 @@
-//! Sixteen particles at a time through a perspective lens: the projection of a ball is close to a circle, so that its ellipse has a
-//! closed form.
+//! Sixteen particles at a time through a perspective lens: the projection of a ball is close to an ellipse that has a closed form, a circle on the
+//! optical axis, stretched by 1 / cos a along the line to the axis at the angle a from it.
 
 use bansho_base::{
     camera::{Camera, Lens},
-    math::{DVec3, simd::LANES},
-    phenomenon::strip::View,
+    math::{
+        DVec3,
+        simd::{LANES, LaneArray},
+    },
 };
 
-use super::{MAX_PIXEL_COORDINATE, PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
+use super::{PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
 use crate::particles::render::{
     gas::Gas,
+    gas_view::GasView,
     splat::{
         Ellipse,
         kernel::{LINE_PEAK, VARIANCE},
     },
 };
 
-type Batch = [f32; LANES];
-
 /// A perspective camera at this frame and the next.
 pub(super) struct PerspectiveProjector {
     now: PinholeCamera,
     next: PinholeCamera,
+    /// At the beginning and end of the exposure; `None` if the camera stands still.
+    ends: Option<[PinholeCamera; 2]>,
     /// Exposure time as a fraction of the frame interval.
     shutter_fraction: f32,
     size: [f32; 2],
+    max_pixel_coordinate: f32,
 }
 
 /// Projected particles.
 struct ProjectedBatch {
-    pixel: [Batch; 2],
-    depth: Batch,
+    pixel: [LaneArray; 2],
+    /// Tangents of the angles from the optical axis, to the right and down.
+    slope: [LaneArray; 2],
+    depth: LaneArray,
     /// Pixels per meter.
-    scale: Batch,
+    scale: LaneArray,
 }
 
 impl PerspectiveProjector {
     /// The projector of a view; `None` unless the lens is a perspective lens.
-    pub(super) fn new(gas: &Gas, view: &View, next: &Camera, shutter_fraction: f64) -> Option<Self> {
+    pub(super) fn new(gas: &Gas, view: &GasView) -> Option<Self> {
         let pinhole = |camera, t| PinholeCamera::new(camera, gas.particles.origin, t - gas.time);
         (view.camera.lens == Lens::Perspective).then(|| Self {
             now: pinhole(&view.camera, view.shutter.middle()),
-            next: pinhole(next, view.next_middle),
-            shutter_fraction: shutter_fraction as f32,
+            next: pinhole(&view.next, view.next_middle),
+            ends: view
+                .ends
+                .as_ref()
+                .map(|[open, close]| [pinhole(open, view.shutter.open), pinhole(close, view.shutter.close)]),
+            shutter_fraction: view.shutter_fraction() as f32,
             size: view.camera.size.map(|side| side as f32),
+            max_pixel_coordinate: view.max_pixel_coordinate() as f32,
         })
     }
 
@@ -76,28 +87,32 @@ impl PerspectiveProjector {
     #[inline(always)]
     fn project_batch<K: SpriteKind>(&self, gas: &Gas, indices: &[usize], kind: &K, records: &mut Vec<K::Record>) {
         let (now, next) = (self.now.project(gas, indices), self.next.project(gas, indices));
-        let mut motion = [[0.0; LANES]; 2];
-        for axis in 0..2 {
-            for lane in 0..LANES {
-                let moved = next.pixel[axis][lane] - now.pixel[axis][lane];
-                motion[axis][lane] = if next.depth[lane] >= self.next.near { moved } else { 0.0 };
+        let motion = next.motion_since(&now, self.next.near);
+        let mut blur = motion;
+        if let Some([open, close]) = &self.ends {
+            blur = close.project(gas, indices).motion_since(&open.project(gas, indices), close.near);
+        } else {
+            for axis in 0..2 {
+                for lane in 0..LANES {
+                    blur[axis][lane] *= self.shutter_fraction;
+                }
             }
         }
-        let ellipses = self.ellipses(gas, indices, &now, &motion);
+        let ellipses = self.ellipses(gas, indices, &now, &blur);
         for (lane, &index) in indices.iter().enumerate() {
             let center = [now.pixel[0][lane], now.pixel[1][lane]];
             let half_size = [ellipses.half_size[0][lane], ellipses.half_size[1][lane]];
             let mut is_visible = now.depth[lane] >= self.now.near && ellipses.peak[lane] > 0.0;
             for axis in 0..2 {
                 is_visible &= center[axis] + half_size[axis] > 0.0 && center[axis] - half_size[axis] < self.size[axis];
-                is_visible &= center[axis].abs() < MAX_PIXEL_COORDINATE as f32;
+                is_visible &= center[axis].abs() < self.max_pixel_coordinate;
             }
             if is_visible {
                 let shape = [ellipses.shape[0][lane], ellipses.shape[1][lane], ellipses.shape[2][lane]];
                 let (radius, peak) = (ellipses.radius[lane], ellipses.peak[lane]);
                 records.push(kind.record(&ProjectedParticle {
                     index,
-                    ellipse: Ellipse { center, shape, half_size, radius, peak },
+                    ellipse: Ellipse { center, shape, half_size, radius, peak, cap: None },
                     depth: f64::from(now.depth[lane]),
                     motion: [motion[0][lane], motion[1][lane]],
                     scale: now.scale[lane],
@@ -106,11 +121,13 @@ impl PerspectiveProjector {
         }
     }
 
-    /// Circles blurred along their motion: the matrix `q + k b b^T` with the motion blur b has the eigenvalue q across it.
+    /// Ellipses blurred along their motion: the matrix `a + u u^T + v v^T`, where a is the squared radius of the ball and of the pixel, u the
+    /// radius times the slope of the ray from the optical axis, which is how a picture on a plane stretches a ball, and v the motion blur.
     #[inline(always)]
-    fn ellipses(&self, gas: &Gas, indices: &[usize], now: &ProjectedBatch, motion: &[Batch; 2]) -> EllipseBatch {
+    fn ellipses(&self, gas: &Gas, indices: &[usize], now: &ProjectedBatch, blur: &[LaneArray; 2]) -> EllipseBatch {
         /// Squared radius per squared length of motion: the variance of a box over that of a sprite.
         const BLUR_SCALE: f32 = (1.0 / (12.0 * VARIANCE)) as f32;
+        let blur_scale = BLUR_SCALE.sqrt();
         let zero = [0.0; LANES];
         let mut radii = zero;
         for (radius, &index) in radii.iter_mut().zip(indices) {
@@ -120,31 +137,57 @@ impl PerspectiveProjector {
         for lane in 0..LANES {
             let ball = now.scale[lane] * radii[lane];
             let across = ball.mul_add(ball, (PIXEL_FOOTPRINT / VARIANCE) as f32);
-            let (x, y) = (motion[0][lane] * self.shutter_fraction, motion[1][lane] * self.shutter_fraction);
-            let (xx, yy) = ((BLUR_SCALE * x).mul_add(x, across), (BLUR_SCALE * y).mul_add(y, across));
-            let determinant = across * (across + BLUR_SCALE * x.mul_add(x, y * y));
+            let slope = [now.slope[0][lane], now.slope[1][lane]];
+            let (u, v) = ([ball * slope[0], ball * slope[1]], [blur_scale * blur[0][lane], blur_scale * blur[1][lane]]);
+            let (xx, yy) =
+                (u[0].mul_add(u[0], v[0].mul_add(v[0], across)), u[1].mul_add(u[1], v[1].mul_add(v[1], across)));
+            let xy = u[0].mul_add(u[1], v[0] * v[1]);
+            // Without the cancellation of xx yy - xy^2.
+            let cross = u[0] * v[1] - u[1] * v[0];
+            let stretch = u[0].mul_add(u[0], u[1] * u[1]) + v[0].mul_add(v[0], v[1] * v[1]);
+            let determinant = across.mul_add(across + stretch, cross * cross);
             let inverse = 1.0 / determinant;
+            let larger_eigenvalue = across + 0.5 * stretch + (0.25 * stretch * stretch - cross * cross).max(0.0).sqrt();
             ellipses.shape[0][lane] = yy * inverse;
-            ellipses.shape[1][lane] = -BLUR_SCALE * x * y * inverse;
+            ellipses.shape[1][lane] = -xy * inverse;
             ellipses.shape[2][lane] = xx * inverse;
             ellipses.half_size[0][lane] = xx.sqrt();
             ellipses.half_size[1][lane] = yy.sqrt();
-            ellipses.radius[lane] = across.sqrt();
+            ellipses.radius[lane] = (determinant / larger_eigenvalue).sqrt();
             // A ball around the camera is only visible in front of it.
             let in_front = ((now.depth[lane] - self.now.near) / radii[lane]).clamp(0.0, 1.0);
             let in_front = in_front * in_front * (3.0 - 2.0 * in_front);
-            let peak = LINE_PEAK as f32 * in_front * now.scale[lane] * now.scale[lane] / determinant.sqrt();
+            // Area of the ball's ellipse over that of the disc that the ball shows along its ray.
+            let area =
+                now.scale[lane] * now.scale[lane] * slope[0].mul_add(slope[0], slope[1].mul_add(slope[1], 1.0)).sqrt();
+            let peak = LINE_PEAK as f32 * in_front * area / determinant.sqrt();
             ellipses.peak[lane] = if determinant < f32::MAX { peak } else { 0.0 };
         }
         ellipses
     }
 }
 
+impl ProjectedBatch {
+    /// Motion in the picture since an earlier time, pixels; 0 for what is nearer than `near` at either time.
+    #[inline(always)]
+    fn motion_since(&self, earlier: &Self, near: f32) -> [LaneArray; 2] {
+        let mut motion = [[0.0; LANES]; 2];
+        for axis in 0..2 {
+            for lane in 0..LANES {
+                let moved = self.pixel[axis][lane] - earlier.pixel[axis][lane];
+                let is_seen = self.depth[lane] >= near && earlier.depth[lane] >= near;
+                motion[axis][lane] = if is_seen { moved } else { 0.0 };
+            }
+        }
+        motion
+    }
+}
+
 struct EllipseBatch {
-    shape: [Batch; 3],
-    half_size: [Batch; 2],
-    radius: Batch,
-    peak: Batch,
+    shape: [LaneArray; 3],
+    half_size: [LaneArray; 2],
+    radius: LaneArray,
+    peak: LaneArray,
 }
 
 /// A perspective camera relative to the particles' origin.
@@ -191,12 +234,14 @@ impl PinholeCamera {
             }
         }
         let zero = [0.0; LANES];
-        let mut projected = ProjectedBatch { pixel: [zero; 2], depth: zero, scale: zero };
+        let mut projected = ProjectedBatch { pixel: [zero; 2], slope: [zero; 2], depth: zero, scale: zero };
         for lane in 0..LANES {
             let depth = -local[2][lane];
             let scale = self.focal_pixels / depth;
             projected.depth[lane] = depth;
             projected.scale[lane] = scale;
+            projected.slope[0][lane] = local[0][lane] / depth;
+            projected.slope[1][lane] = -local[1][lane] / depth;
             projected.pixel[0][lane] = scale.mul_add(local[0][lane], self.center[0]);
             projected.pixel[1][lane] = scale.mul_add(-local[1][lane], self.center[1]);
         }

@@ -10,7 +10,7 @@ use bansho_base::{
     noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
 };
 
-use crate::particles::{parameters::RenderingParameters, render::gas::Gas};
+use crate::particles::{parameters::GasRenderingParameters, render::gas::Gas};
 
 /// Standard deviation of the logistic distribution, pi / sqrt(3): its CDF is a sigmoid of slope 1.
 const LOGISTIC: f32 = 1.813_799_4;
@@ -77,7 +77,7 @@ pub(crate) struct DetailScale {
 
 impl Detail {
     /// The detail of a flame; `None` if there is none.
-    pub(crate) fn new(gas: &Gas, rendering: &RenderingParameters, scale: &DetailScale) -> Option<Self> {
+    pub(crate) fn new(gas: &Gas, rendering: &GasRenderingParameters, scale: &DetailScale) -> Option<Self> {
         if rendering.detail <= 0.0 || !(scale.radius > 0.0 && scale.absorption > 0.0) {
             return None;
         }

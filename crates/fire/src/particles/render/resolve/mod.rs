@@ -1,10 +1,13 @@
 //! Resolves summed sprites to light and opacity, row by row and layer by layer, sixteen pixels at a time.
 
 use bansho_base::{
-    camera::Camera,
+    camera::{Camera, Lens},
     color,
     image::Rect,
-    math::{DVec2, DVec3, approximations, simd::LANES},
+    math::{
+        DVec2, DVec3, approximations,
+        simd::{LANES, LaneArray},
+    },
     phenomenon::strip::Strip,
 };
 
@@ -35,8 +38,6 @@ pub(crate) const DETAIL_OFFSET: usize = 3;
 pub(crate) const BLUE: usize = 6;
 /// Plane of the optical path difference to air, in pixels, for heat haze.
 pub(crate) const PATH: usize = 7;
-
-type Batch = [f32; LANES];
 
 /// Minimum of optical depths and luminances that are divided by.
 const MIN_DEPTH: f32 = 1e-30;
@@ -71,7 +72,7 @@ pub(crate) struct DepthLayer {
 }
 
 /// One row of cells, interpolated vertically.
-pub(crate) struct RowBuffer {
+pub(crate) struct ResolvedRow {
     /// Sums of all layers.
     sums: Vec<f32>,
     /// Detail strain of the layer that was filled last.
@@ -80,16 +81,16 @@ pub(crate) struct RowBuffer {
 
 /// Sums of one layer at sixteen pixels.
 pub(crate) struct LayerSums {
-    pub(crate) tau: Batch,
-    pub(crate) luminance: Batch,
-    pub(crate) luminance_kelvin: Batch,
-    blue: Batch,
+    pub(crate) tau: LaneArray,
+    pub(crate) luminance: LaneArray,
+    pub(crate) luminance_kelvin: LaneArray,
+    blue: LaneArray,
 }
 
 impl GasResolver<'_> {
     /// Buffers for [`fill`](Self::fill).
-    pub(crate) fn row(&self) -> RowBuffer {
-        RowBuffer { sums: vec![0.0; self.grid.row_length()], strain: vec![0.0; self.grid.cells.columns] }
+    pub(crate) fn row(&self) -> ResolvedRow {
+        ResolvedRow { sums: vec![0.0; self.grid.row_length()], strain: vec![0.0; self.grid.cells.columns] }
     }
 
     /// Fills the buffer with the sums of a layer along row `y` of the picture; returns the range of pixels that may not be empty.
@@ -99,7 +100,7 @@ impl GasResolver<'_> {
         layer: usize,
         y: usize,
         extents: &ColumnExtents,
-        row: &mut RowBuffer,
+        row: &mut ResolvedRow,
     ) -> Option<[usize; 2]> {
         let (cells, depth) = (&self.grid.cells, self.grid.depth);
         let (cell, phase) = cells.cell_before(1, y);
@@ -127,8 +128,11 @@ impl GasResolver<'_> {
 
     /// Sums of a layer at sixteen pixels; `None` if none is visible.
     #[inline(always)]
-    pub(crate) fn sums(&self, row: &RowBuffer, layer: usize, x: usize) -> Option<LayerSums> {
+    pub(crate) fn sums(&self, row: &ResolvedRow, layer: usize, [x, y]: [usize; 2]) -> Option<LayerSums> {
         let mut planes = self.planes(row, layer, x, [TAU, LUMINANCE, LUMINANCE_KELVIN, BLUE]);
+        if self.camera.lens == Lens::Fisheye {
+            self.clear_outside_circle(&mut planes, [x, y]);
+        }
         // Smaller values are visible neither as light nor as opacity.
         let (mut max_tau, mut max_blue) = (1e-6_f32, 1e-3_f32);
         for lane in 0..LANES {
@@ -148,9 +152,29 @@ impl GasResolver<'_> {
         Some(LayerSums { tau, luminance, luminance_kelvin, blue })
     }
 
+    /// Clears what is outside the circle of a fisheye, beyond which sprites extend.
+    #[inline(always)]
+    fn clear_outside_circle(&self, planes: &mut [LaneArray], [x, y]: [usize; 2]) {
+        let center = self.camera.principal_point;
+        let radius = self.camera.half_angle() * self.camera.focal_pixels;
+        let down = y as f64 + 0.5 - center.y;
+        for lane in 0..LANES {
+            let right = (x + lane) as f64 + 0.5 - center.x;
+            if right * right + down * down > radius * radius {
+                planes.iter_mut().for_each(|plane| plane[lane] = 0.0);
+            }
+        }
+    }
+
     /// Planes of a layer at sixteen pixels.
     #[inline(always)]
-    fn planes<const N: usize>(&self, row: &RowBuffer, layer: usize, x: usize, mut planes: [usize; N]) -> [Batch; N] {
+    fn planes<const N: usize>(
+        &self,
+        row: &ResolvedRow,
+        layer: usize,
+        x: usize,
+        mut planes: [usize; N],
+    ) -> [LaneArray; N] {
         for plane in &mut planes {
             *plane += layer * PLANES;
         }
@@ -159,7 +183,7 @@ impl GasResolver<'_> {
 
     /// Fraction of the detail that is visible at sixteen pixels.
     #[inline(always)]
-    fn visible_fraction(&self, row: &RowBuffer, x: usize) -> Batch {
+    fn visible_fraction(&self, row: &ResolvedRow, x: usize) -> LaneArray {
         let [strain] = self.row_interpolator.at(&row.strain, 1, x, [0]);
         strain::visible_fraction(&strain)
     }
@@ -169,11 +193,11 @@ impl GasResolver<'_> {
     fn noise_positions(
         &self,
         sums: &LayerSums,
-        row: &RowBuffer,
+        row: &ResolvedRow,
         detail: &Detail,
         layer: &DepthLayer,
         [x, y]: [usize; 2],
-    ) -> Option<[Batch; 3]> {
+    ) -> Option<[LaneArray; 3]> {
         let at = |column: f64| {
             let direction = self.camera.direction(DVec2::new(column, y as f64 + 0.5))?;
             Some((self.camera.position + direction * layer.depth - self.origin).as_vec3().to_array())
@@ -200,7 +224,7 @@ impl GasResolver<'_> {
         layer: &DepthLayer,
         extents: &ColumnExtents,
         rect: Rect,
-        row: &mut RowBuffer,
+        row: &mut ResolvedRow,
         strip: &mut Strip,
     ) {
         for y in rect.y..rect.bottom() {
@@ -208,7 +232,7 @@ impl GasResolver<'_> {
             // Batches start at multiples of sixteen columns of the whole picture, so that pixels do not depend on crops.
             let from = first.max(rect.x) / LANES * LANES;
             for x in (from..last.min(rect.right())).step_by(LANES) {
-                if let Some(sums) = self.sums(row, layer.index, x) {
+                if let Some(sums) = self.sums(row, layer.index, [x, y]) {
                     self.draw_batch(&sums, row, layer, [x, y], rect, strip);
                 }
             }
@@ -219,7 +243,7 @@ impl GasResolver<'_> {
     fn draw_batch(
         &self,
         sums: &LayerSums,
-        row: &RowBuffer,
+        row: &ResolvedRow,
         layer: &DepthLayer,
         [x, y]: [usize; 2],
         rect: Rect,
@@ -230,34 +254,19 @@ impl GasResolver<'_> {
         if from >= to {
             return;
         }
-        let start = (y - strip.rect.y) * strip.rect.width + from - strip.rect.x;
-        let mut visible_fraction = [1.0; LANES];
-        if strip.has_plate() {
-            for pixel in from..to {
-                let distance = (f64::from(strip.plate_depth(start + pixel - from)) - layer.depth) / layer.thickness;
-                visible_fraction[pixel - x] = (distance + 0.5).clamp(0.0, 1.0) as f32;
-            }
-        }
-        let mut light = self.light(sums, row, layer, x, y);
-        for plane in &mut light.planes {
-            for lane in 0..LANES {
-                plane[lane] *= visible_fraction[lane];
-            }
-        }
-        let lit = from - x..to - x;
-        let mut depth = [f32::INFINITY; LANES];
-        for lane in lit.clone() {
-            if light.planes[3][lane] > 1e-3 || light.planes[1][lane] > 1e-2 {
-                depth[lane] = layer.depth as f32;
-            }
-        }
-        let [red, green, blue, opacity] = light.planes.each_ref().map(|plane| &plane[lit.clone()]);
-        strip.add_row_behind(start, [red, green, blue], Some(opacity), &depth[lit]);
+        self.light(sums, row, layer, x, y).composite(layer, [x, y], from..to, strip);
     }
 
     /// Red, green, blue and opacity of sixteen pixels of a layer.
     #[inline(always)]
-    fn light(&self, sums: &LayerSums, row: &RowBuffer, layer: &DepthLayer, x: usize, y: usize) -> PixelLight {
+    pub(crate) fn light(
+        &self,
+        sums: &LayerSums,
+        row: &ResolvedRow,
+        layer: &DepthLayer,
+        x: usize,
+        y: usize,
+    ) -> PixelLight {
         let LayerSums { tau, luminance, luminance_kelvin, .. } = sums;
         let (mut depth_factor, mut temperature_factor) = ([1.0; LANES], [1.0; LANES]);
         if let Some((detail, _)) = self.detail
@@ -278,8 +287,8 @@ impl GasResolver<'_> {
         let (mut emitted_luminance, mut kelvin) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
             emitted_luminance[lane] = emission[lane] * luminance[lane] / tau[lane].max(MIN_DEPTH);
-            kelvin[lane] =
-                self.temperature(luminance_kelvin[lane], luminance[lane].max(MIN_DEPTH)) * temperature_factor[lane];
+            kelvin[lane] = mean_temperature(luminance_kelvin[lane], luminance[lane].max(MIN_DEPTH), self.temperatures)
+                * temperature_factor[lane];
         }
         let table = color::black_body();
         for lane in 0..LANES {
@@ -307,13 +316,46 @@ impl GasResolver<'_> {
     }
 }
 
-impl GasResolver<'_> {
-    /// Mean temperature, K, clamped to the range of the particles: at very low luminance it is a quotient of rounding errors.
+impl PixelLight {
+    /// Composites the columns `lit` of a layer, of which the first of all is `x`, behind the contents of a strip.
     #[inline(always)]
-    pub(crate) fn temperature(&self, luminance_kelvin: f32, luminance: f32) -> f32 {
-        let [coldest, hottest] = self.temperatures;
-        (luminance_kelvin / luminance).max(coldest).min(hottest)
+    pub(crate) fn composite(
+        mut self,
+        layer: &DepthLayer,
+        [x, y]: [usize; 2],
+        columns: std::ops::Range<usize>,
+        strip: &mut Strip,
+    ) {
+        let start = (y - strip.rect.y) * strip.rect.width + columns.start - strip.rect.x;
+        let mut visible_fraction = [1.0; LANES];
+        if strip.has_plate() {
+            for pixel in columns.clone() {
+                let plate_depth = strip.plate_depth(start + pixel - columns.start);
+                let distance = (f64::from(plate_depth) - layer.depth) / layer.thickness;
+                visible_fraction[pixel - x] = (distance + 0.5).clamp(0.0, 1.0) as f32;
+            }
+        }
+        for plane in &mut self.planes {
+            for lane in 0..LANES {
+                plane[lane] *= visible_fraction[lane];
+            }
+        }
+        let lit = columns.start - x..columns.end - x;
+        let mut depth = [f32::INFINITY; LANES];
+        for lane in lit.clone() {
+            if self.planes[3][lane] > 1e-3 || self.planes[1][lane] > 1e-2 {
+                depth[lane] = layer.depth as f32;
+            }
+        }
+        let [red, green, blue, opacity] = self.planes.each_ref().map(|plane| &plane[lit.clone()]);
+        strip.add_row_behind(start, [red, green, blue], Some(opacity), &depth[lit]);
     }
+}
+
+/// Mean temperature, K, limited to the range of the particles: at very low luminance it is a quotient of rounding errors.
+#[inline(always)]
+pub(crate) fn mean_temperature(luminance_kelvin: f32, luminance: f32, [coldest, hottest]: [f32; 2]) -> f32 {
+    (luminance_kelvin / luminance).max(coldest).min(hottest)
 }
 
 /// Weighted sum of the values of four cells of a layer, which start at `starts` in `rows`.
@@ -330,8 +372,8 @@ fn weighted_cells(rows: [&[f32]; 4], starts: [usize; 4], weights: &[f32; 4]) -> 
 }
 
 /// Red, green, blue and opacity.
-struct PixelLight {
-    planes: [Batch; 4],
+pub(crate) struct PixelLight {
+    pub(crate) planes: [LaneArray; 4],
 }
 
 /// First and last occupied column of cells, for each row and layer.

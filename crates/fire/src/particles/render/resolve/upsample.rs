@@ -17,17 +17,22 @@ struct Span {
     weights: Range<usize>,
 }
 
-/// Weights of cells for all pixels of a row of the whole picture.
+/// Weights of cells for pixels of a row of the whole picture.
 pub(crate) struct RowInterpolator {
+    /// Number of the first batch of sixteen pixels, counted from the picture's edge.
+    first_batch: usize,
     spans: Vec<Span>,
     weights: Vec<[f32; LANES]>,
 }
 
 impl RowInterpolator {
-    /// An interpolator for rows of `width` pixels; `phase_weights` are the weights of the four surrounding cells for each pixel phase.
-    pub(crate) fn new(grid: &Grid, width: usize, phase_weights: &[[f32; 4]]) -> Self {
-        let columns = grid.columns(0, width);
-        let mut interpolator = Self { spans: Vec::with_capacity(columns.len().div_ceil(LANES)), weights: Vec::new() };
+    /// An interpolator for the pixels `pixels` of rows, extended to whole batches; `phase_weights` are the weights of the four surrounding cells for
+    /// each pixel phase.
+    pub(crate) fn new(grid: &Grid, pixels: Range<usize>, phase_weights: &[[f32; 4]]) -> Self {
+        let first_batch = pixels.start / LANES;
+        let columns = grid.columns(first_batch * LANES, pixels.end.saturating_sub(first_batch * LANES));
+        let spans = Vec::with_capacity(columns.len().div_ceil(LANES));
+        let mut interpolator = Self { first_batch, spans, weights: Vec::new() };
         for batch in columns.chunks(LANES) {
             let [first, last] = [batch[0].0, batch[batch.len() - 1].0];
             let begin = interpolator.weights.len();
@@ -52,7 +57,8 @@ impl RowInterpolator {
         planes: [usize; N],
     ) -> [[f32; LANES]; N] {
         let mut sums = [[0.0; LANES]; N];
-        let Some(span) = self.spans.get(x / LANES) else { return sums };
+        let batch = (x / LANES).checked_sub(self.first_batch);
+        let Some(span) = batch.and_then(|batch| self.spans.get(batch)) else { return sums };
         let cells = row[span.first * stride..].chunks_exact(stride);
         for (weights, values) in self.weights[span.weights.clone()].iter().zip(cells) {
             for n in 0..N {
@@ -85,7 +91,7 @@ mod tests {
             }
             let weights = grid.cells.spline_weights();
             let (across, columns, row) =
-                (RowInterpolator::new(&grid, width, &weights), grid.columns(0, width), grid.row(2));
+                (RowInterpolator::new(&grid, 0..width, &weights), grid.columns(0, width), grid.row(2));
             for x in (0..width).step_by(LANES) {
                 let found = across.at(row, DEPTH, x, [2, 0]);
                 for pixel in x..(x + LANES).min(width) {

@@ -5,6 +5,9 @@
 
 use std::f64::consts::PI;
 
+/// Minimum `s = 1 - b^2/d^2` that is drawn: there a sprite has 1e-4 of its peak.
+pub(crate) const MIN_S: f32 = 0.045;
+
 /// The integral of poly6, eq. (2), along a ray at distance `b` from the center, 1/m^2: `9/(2 pi d^2) (1 - b^2/d^2)^(7/2)`. The exact form, to
 /// which tests compare; pictures use `Profile::LINE`.
 pub fn line_integral(b: f64, d: f64) -> f64 {

@@ -6,18 +6,25 @@
 
 use std::ops::Range;
 
-use bansho_base::{host::parallel::prelude::*, image::Rect, math::simd::LANES};
+use bansho_base::{
+    camera::{Camera, Lens},
+    host::parallel::prelude::*,
+    image::Rect,
+    math::simd::LANES,
+};
 use fearless_simd::dispatch;
 
 use crate::particles::render::{
     buffer_pool::{BufferPool, PooledVec},
     splat::{
+        cap::Cap,
         grid::{Grid, Raster},
         kernel::Profile,
         rasterize::{COLUMNS, ROWS, RasterizedSprite},
     },
 };
 
+pub(crate) mod cap;
 pub(crate) mod grid;
 pub(crate) mod kernel;
 pub(crate) mod rasterize;
@@ -43,6 +50,8 @@ pub(crate) struct Ellipse {
     pub(crate) radius: f32,
     /// Line integral through the center, for a particle of 1 m^3 with an absorption coefficient of 1/m.
     pub(crate) peak: f32,
+    /// The ball itself where no ellipse describes it; only the bounding box is then that of an ellipse.
+    pub(crate) cap: Option<Cap>,
 }
 
 /// One sprite: `P` values, weighted by its profile, for layer `layer` and, with the weight `next_layer_weight`, the next.
@@ -65,6 +74,8 @@ pub(crate) struct SplatSettings {
     pub(crate) picture: [usize; 2],
     /// The window of it that is drawn.
     pub(crate) window: Rect,
+    /// The camera whose picture it is.
+    pub(crate) camera: Camera,
 }
 
 /// Result of a splat.
@@ -115,7 +126,8 @@ pub(crate) fn splat<'a, const P: usize>(
         }
         let mut grid = Grid::new(cells(grid_level), settings.layers * P, buffers);
         let is_on_this_grid = |radius: f32| settings.grid_level(radius).max(finest).wrapping_sub(grid_level) < 2;
-        add_sprites(settings, tasks, is_on_this_grid, whole_picture_columns(grid_level), &mut grid);
+        let directions = if statistics.has_caps { cap::directions(&settings.camera, &grid.cells) } else { Vec::new() };
+        add_sprites(settings, tasks, is_on_this_grid, whole_picture_columns(grid_level), &directions, &mut grid);
         if let Some(coarser) = coarser {
             grid.add_coarser(&coarser);
         }
@@ -140,7 +152,9 @@ impl SplatSettings {
     fn grid_level(&self, radius: f32) -> usize {
         // The exponent of a float counts octaves; its first mantissa bit distinguishes the upper from the lower half of an octave.
         let half_octaves = ((radius / self.min_radius_cells).max(1.0).to_bits() >> 22) as usize - (127 << 1);
-        if half_octaves == 1 { 0 } else { half_octaves.min(MAX_LEVEL) }
+        let level = if half_octaves == 1 { 0 } else { half_octaves.min(MAX_LEVEL) };
+        // Only cells of powers of two repeat where a panorama does.
+        if self.camera.lens == Lens::Panorama { level / 2 * 2 } else { level }
     }
 }
 
@@ -150,10 +164,12 @@ struct SpriteStatistics {
     high: [f32; 2],
     /// Number of sprites for each grid level.
     counts: [usize; MAX_LEVEL + 1],
+    /// Whether any of them is a cap.
+    has_caps: bool,
 }
 
 impl SpriteStatistics {
-    const EMPTY: Self = Self { low: [f32::MAX; 2], high: [f32::MIN; 2], counts: [0; MAX_LEVEL + 1] };
+    const EMPTY: Self = Self { low: [f32::MAX; 2], high: [f32::MIN; 2], counts: [0; MAX_LEVEL + 1], has_caps: false };
 
     fn new<const P: usize>(settings: &SplatSettings, tasks: &[PooledVec<Sprite<P>>]) -> Self {
         let of_task = |task: &PooledVec<Sprite<P>>| {
@@ -164,10 +180,11 @@ impl SpriteStatistics {
                     statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.half_size[axis]);
                 }
                 statistics.counts[settings.grid_level(ellipse.radius)] += 1;
+                statistics.has_caps |= ellipse.cap.is_some();
             }
             statistics
         };
-        tasks.par_iter().map(of_task).reduce(|| Self::EMPTY, Self::merge)
+        tasks.par_iter().map(of_task).reduce_with(Self::merge).unwrap_or(Self::EMPTY)
     }
 
     fn merge(mut self, other: Self) -> Self {
@@ -175,6 +192,7 @@ impl SpriteStatistics {
             self.low[axis] = self.low[axis].min(other.low[axis]);
             self.high[axis] = self.high[axis].max(other.high[axis]);
         }
+        self.has_caps |= other.has_caps;
         self.counts.iter_mut().zip(other.counts).for_each(|(own, other)| *own += other);
         self
     }
@@ -210,6 +228,7 @@ fn add_sprites<'a, const P: usize>(
     tasks: &[PooledVec<'a, Sprite<P>>],
     is_on_this_grid: impl Fn(f32) -> bool + Sync,
     whole_picture_columns: Range<i32>,
+    directions: &[[f32; 3]],
     grid: &mut Grid,
 ) {
     let cells = grid.cells;
@@ -220,7 +239,9 @@ fn add_sprites<'a, const P: usize>(
         let (columns, whole_picture_columns) = (cells.picture_columns(), whole_picture_columns.clone());
         let top = cells.first[1] + (index * ROWS_PER_TASK) as i32;
         values.fill(0.0);
-        let mut row_band = RowBand { first: top, columns, whole_picture_columns, layers: settings.layers, values };
+        let directions = directions.get(index * ROWS_PER_TASK * columns.len()..).unwrap_or_default();
+        let layers = settings.layers;
+        let mut row_band = RowBand { first: top, columns, whole_picture_columns, layers, directions, values };
         for task in &binned {
             dispatch!(level, _simd => row_band.add(settings.profile, task, index));
         }
@@ -235,6 +256,8 @@ struct RowBand<'a> {
     /// Columns of the grid of the whole picture.
     whole_picture_columns: Range<i32>,
     layers: usize,
+    /// Directions of the cells, if there are caps.
+    directions: &'a [[f32; 3]],
     values: &'a mut [f32],
 }
 
@@ -247,6 +270,15 @@ impl RowBand<'_> {
         for &member in task.members_of_band(index) {
             let sprite = &task.sprites[usize::from(member)];
             let (from, to) = (sprite.rows[0].max(self.first), sprite.rows[1].min(end));
+            if let Some(cap) = &sprite.cap {
+                let rows = (from - self.first) as usize..(to.max(from) - self.first) as usize;
+                let cells = sums[rows.start * row_length..rows.end * row_length].chunks_exact_mut(row_length);
+                let directions = self.directions[rows.start * self.columns.len()..].chunks_exact(self.columns.len());
+                for (row, directions) in cells.zip(directions) {
+                    add_cap(profile, sprite, cap, directions, self.layers, row);
+                }
+                continue;
+            }
             for start in (from..to).step_by(ROWS) {
                 let chords = sprite.chords(start, &self.whole_picture_columns);
                 for y in start..to.min(start + ROWS as i32) {
@@ -267,6 +299,29 @@ impl RowBand<'_> {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Accumulates a row of a cap.
+#[inline(always)]
+fn add_cap<const P: usize>(
+    profile: Profile,
+    sprite: &RasterizedSprite<P>,
+    cap: &Cap,
+    directions: &[[f32; 3]],
+    layers: usize,
+    row: &mut [[f32; P]],
+) {
+    for (run, directions) in directions.chunks(COLUMNS).enumerate() {
+        let mut weights = [0.0; COLUMNS];
+        let mut sum = 0.0;
+        for (weight, direction) in weights.iter_mut().zip(directions) {
+            *weight = cap.weight(profile, direction);
+            sum += *weight;
+        }
+        if sum > 0.0 {
+            sprite.add(row, run * COLUMNS, layers, &weights);
         }
     }
 }
@@ -331,6 +386,8 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::camera::CameraParameters;
+
     use super::*;
 
     #[test]
@@ -341,6 +398,7 @@ mod tests {
             layers: 1,
             picture: [0; 2],
             window: Rect::default(),
+            camera: CameraParameters::default().at(0.0, [8, 8]),
         };
         let sizes: Vec<usize> = (2..10).map(cell_size).collect();
         assert_eq!((cell_size(0), sizes), (1, vec![2, 3, 4, 6, 8, 12, 16, 24]));

@@ -6,7 +6,12 @@ use std::ops::Range;
 
 use bansho_base::math::approximations;
 
-use crate::particles::render::splat::{SplatSettings, Sprite, grid::Raster, kernel::Profile};
+use crate::particles::render::splat::{
+    SplatSettings, Sprite,
+    cap::Cap,
+    grid::Raster,
+    kernel::{MIN_S, Profile},
+};
 
 /// Cells per batch of weights: about one row of a sprite.
 pub(crate) const COLUMNS: usize = 8;
@@ -15,8 +20,6 @@ pub(crate) const ROWS: usize = 16;
 /// Offsets of cells and rows from the one before the first. (They start at 1, since compilers would treat a zero as a special case.)
 const LANE_OFFSETS: [f32; ROWS] =
     [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0];
-/// Minimum `s = 1 - b^2/d^2` that is drawn: there a sprite has 1e-4 of its peak.
-const MIN_S: f32 = 0.045;
 
 /// A sprite in cell coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +39,8 @@ pub(crate) struct RasterizedSprite<const P: usize> {
     /// Values for the next layer.
     next_values: [f32; P],
     spans_two_layers: bool,
+    /// What it is instead of an ellipse.
+    pub(crate) cap: Option<Cap>,
 }
 
 impl<const P: usize> RasterizedSprite<P> {
@@ -61,7 +66,8 @@ impl<const P: usize> RasterizedSprite<P> {
             next_values[i] *= attenuation * sprite.next_layer_weight;
         }
         let (layer, spans_two_layers) = (sprite.layer, sprite.next_layer_weight > 0.0);
-        Self { center, falloff: a, shear, row_falloff, rows, layer, values, next_values, spans_two_layers }
+        let cap = ellipse.cap.map(|cap| Cap { falloff: cap.falloff / (widening * widening), ..cap });
+        Self { center, falloff: a, shear, row_falloff, rows, layer, values, next_values, spans_two_layers, cap }
     }
 
     /// Chords of the sprite in the rows from `first` on, where `s = 1 - (a u^2 + 2 b u v + c v^2)` is large enough.

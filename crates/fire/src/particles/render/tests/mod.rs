@@ -1,6 +1,8 @@
 //! The drawing against closed forms: one ball of gas, pairs of them, and clouds.
 
 mod endings;
+mod exposures;
+mod lenses;
 mod paper;
 mod seams;
 
@@ -26,7 +28,7 @@ use bansho_base::{
 };
 
 use super::{deflection::refractivity, *};
-use crate::particles::{Particle, Particles, render::splat::kernel::LINE_PEAK};
+use crate::particles::{GasParticles, Particle, render::splat::kernel::LINE_PEAK};
 
 const SIZE: [usize; 2] = [160, 120];
 const DISTANCE: f64 = 4.0;
@@ -61,21 +63,21 @@ fn ball(id: u64, position: [f32; 3], temperature: f32, soot: f32) -> Particle {
     }
 }
 
-fn cloud(balls: impl IntoIterator<Item = Particle>) -> Particles {
-    let mut particles = Particles::new(DVec3::ZERO);
+fn cloud(balls: impl IntoIterator<Item = Particle>) -> GasParticles {
+    let mut particles = GasParticles::new(DVec3::ZERO);
     balls.into_iter().for_each(|ball| particles.push(ball));
     particles
 }
 
 /// A cloud of glowing gas around the origin.
-fn glowing_cloud(count: u64) -> Particles {
+fn glowing_cloud(count: u64) -> GasParticles {
     cloud((0..count).map(|id| {
         let [x, y, z, w] = Key::new(3, "cloud").uniforms(id, 0, Purpose::named("place")).map(|u| u - 0.5);
         ball(id, [0.9 * x, 1.2 * y, 0.9 * z], 1700.0 + 300.0 * w, 4e-7)
     }))
 }
 
-fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
+fn gas<'a>(particles: &'a GasParticles, buffers: &'a BufferPool) -> Gas<'a> {
     Gas {
         particles,
         time: 1.0,
@@ -89,14 +91,14 @@ fn gas<'a>(particles: &'a Particles, buffers: &'a BufferPool) -> Gas<'a> {
     }
 }
 
-fn smooth() -> RenderingParameters {
-    RenderingParameters { detail: 0.0, ..RenderingParameters::default() }
+fn smooth() -> GasRenderingParameters {
+    GasRenderingParameters { detail: 0.0, ..GasRenderingParameters::default() }
 }
 
 /// Prepares the gas and hands it to `each`.
 fn prepared<T>(
-    particles: &Particles,
-    rendering: &RenderingParameters,
+    particles: &GasParticles,
+    rendering: &GasRenderingParameters,
     view: &View,
     each: impl FnOnce(&PreparedGas) -> T,
 ) -> T {
@@ -108,8 +110,8 @@ fn prepared<T>(
 
 /// The whole picture drawn as one strip, with AOVs where wanted and a plate at `plate` m.
 fn drawn(
-    particles: &Particles,
-    rendering: &RenderingParameters,
+    particles: &GasParticles,
+    rendering: &GasRenderingParameters,
     view: &View,
     aovs: usize,
     plate: Option<f32>,
@@ -192,13 +194,13 @@ fn a_hotter_flame_is_brighter_by_the_ratio_of_physics_and_has_its_color() {
 fn detail_keeps_the_mean_light() {
     let view = view(camera());
     let particles = glowing_cloud(400);
-    let mean = |rendering: &RenderingParameters| {
+    let mean = |rendering: &GasRenderingParameters| {
         let strip = drawn(&particles, rendering, &view, 0, None);
         strip.radiance[1].iter().map(|value| f64::from(*value)).sum::<f64>()
     };
     let (plain, fine) = (
         mean(&smooth()),
-        mean(&RenderingParameters { detail: 1.0, detail_size: 0.25, ..RenderingParameters::default() }),
+        mean(&GasRenderingParameters { detail: 1.0, detail_size: 0.25, ..GasRenderingParameters::default() }),
     );
     assert!((fine / plain - 1.0).abs() < 0.1, "{}", fine / plain);
 }
@@ -207,7 +209,7 @@ fn detail_keeps_the_mean_light() {
 fn no_sprite_is_a_disc() {
     // A lone particle with detail: along the circle of half its radius the light differs by more than its half.
     let view = view(camera());
-    let strip = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 4e-7)]), &RenderingParameters::default(), &view, 0, None);
+    let strip = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 4e-7)]), &GasRenderingParameters::default(), &view, 0, None);
     let radius = 0.5 * 0.3 * view.camera.focal_pixels / DISTANCE;
     let around: Vec<f64> = (0..48)
         .map(|i| {
@@ -223,7 +225,7 @@ fn no_sprite_is_a_disc() {
 fn haze_bends_by_the_gradient_of_the_path_and_only_around_the_gas() {
     let view = view(camera());
     let particles = cloud([ball(0, [0.0; 3], 1500.0, 0.0)]);
-    let rendering = RenderingParameters { heat_haze_gain: 3.0, ..smooth() };
+    let rendering = GasRenderingParameters { heat_haze_gain: 3.0, ..smooth() };
     let scale = view.camera.focal_pixels / DISTANCE;
     prepared(&particles, &rendering, &view, |prepared| {
         let bend = prepared.deflection().unwrap();
@@ -249,7 +251,7 @@ fn haze_bends_by_the_gradient_of_the_path_and_only_around_the_gas() {
             assert!(!inside || at(x, y) == [0.0; 2], "{x} {y}");
         }
     });
-    let straight = RenderingParameters { heat_haze_gain: 0.0, ..smooth() };
+    let straight = GasRenderingParameters { heat_haze_gain: 0.0, ..smooth() };
     assert!(prepared(&particles, &straight, &view, |prepared| prepared.deflection().is_none()));
 }
 
@@ -260,7 +262,7 @@ fn lights_carry_the_light_of_the_picture() {
     let scale = view.camera.focal_pixels / DISTANCE;
     let strip = drawn(&thin, &smooth(), &view, 0, None);
     let seen: f64 = strip.radiance[0].iter().map(|value| f64::from(*value)).sum::<f64>() / (scale * scale);
-    let lights = point_lights_of_gas(&gas(&thin, &BufferPool::default()), &RenderingParameters::default(), 1.0);
+    let lights = point_lights_of_gas(&gas(&thin, &BufferPool::default()), &GasRenderingParameters::default(), 1.0);
     assert_eq!(lights.len(), 3);
     let sum: f64 = lights.iter().map(|light| f64::from(light.intensity[0])).sum();
     assert!((sum / seen - 1.0).abs() < 0.02, "{sum} {seen}");
@@ -281,7 +283,7 @@ fn no_lens_and_no_place_of_the_camera_is_too_much() {
         for position in [[0.0, 0.0, 0.0], [0.05, -0.2, 0.3], [0.0, 0.0, 3.0], [0.0, 5.0, 0.001]] {
             let camera = CameraParameters { lens, position: Animated::from(position), ..camera() };
             for sprite in [SpriteStyle::LineIntegral, SpriteStyle::Poly6, SpriteStyle::Squares] {
-                let rendering = RenderingParameters { sprite, ..RenderingParameters::default() };
+                let rendering = GasRenderingParameters { sprite, ..GasRenderingParameters::default() };
                 let view = view(camera.clone());
                 let strip = drawn(&particles, &rendering, &view, AOVS.len(), None);
                 let finite = strip.radiance.iter().flatten().all(|value| value.is_finite());
@@ -304,7 +306,7 @@ fn strips_crops_and_threads_change_no_bit() {
     // So many, and so small, that there are several tasks of particles and of rows.
     let mut particles = glowing_cloud(10_000);
     particles.support_radius.fill(0.08);
-    let rendering = RenderingParameters::default();
+    let rendering = GasRenderingParameters::default();
     let view = view(camera());
     let whole = drawn(&particles, &rendering, &view, 0, None);
     for threads in [1, 2, 3] {
@@ -332,7 +334,7 @@ fn a_part_of_the_picture_alone_is_the_same_to_the_bit() {
     let mut particles = glowing_cloud(500);
     particles.support_radius.iter_mut().step_by(3).for_each(|radius| *radius *= 0.12);
     particles.support_radius.iter_mut().step_by(7).for_each(|radius| *radius *= 3.0);
-    let rendering = RenderingParameters::default();
+    let rendering = GasRenderingParameters::default();
     let whole_view = view(camera());
     let part = Rect { x: 67, y: 51, width: 31, height: 23 };
     let part_view = View { window: part, ..view(camera()) };
@@ -438,7 +440,7 @@ fn motion_smears_the_sprite_along_its_way_and_loses_no_light() {
 }
 
 /// Light and opacity in the middle of a ball of gas among lights of so much illuminance.
-fn lit_ball(ball: Particle, rendering: &RenderingParameters, illuminance: f32) -> ([f64; 3], f64) {
+fn lit_ball(ball: Particle, rendering: &GasRenderingParameters, illuminance: f32) -> ([f64; 3], f64) {
     let (view, buffers, wind, air) =
         (view(camera()), BufferPool::default(), Wind::new(WindParameters::default(), 1, None), Air::default());
     let sun = Light { emitter: Emitter::Directional { toward: DVec3::Y }, intensity: [illuminance; 3] };
@@ -459,7 +461,7 @@ fn cold_soot_is_smoke_that_hides_and_shows_the_light_of_others_alone() {
     let (dark, opacity) = lit_ball(smoke, &smooth(), 0.0);
     assert!(opacity > 0.5 && dark.iter().all(|value| *value < 1e-6), "{dark:?} {opacity}");
     for albedo in [0.15, 0.3] {
-        let rendering = RenderingParameters { smoke_albedo: albedo, ..smooth() };
+        let rendering = GasRenderingParameters { smoke_albedo: albedo, ..smooth() };
         // Alike in all directions: albedo E / 4 pi where it hides everything.
         let expected = albedo * 1000.0 / (4.0 * std::f64::consts::PI) * opacity;
         let (lit, as_opaque) = lit_ball(smoke, &rendering, 1000.0);
@@ -471,8 +473,8 @@ fn cold_soot_is_smoke_that_hides_and_shows_the_light_of_others_alone() {
 #[test]
 fn freshly_burning_gas_shines_blue_and_hides_nothing_until_soot_outshines_it() {
     let begun = |fuel: f32, soot: f32| Particle { fuel, ..ball(0, [0.0; 3], 1900.0, soot) };
-    let once = RenderingParameters { base_blue: 1.0, ..smooth() };
-    let twice = RenderingParameters { base_blue: 2.0, ..smooth() };
+    let once = GasRenderingParameters { base_blue: 1.0, ..smooth() };
+    let twice = GasRenderingParameters { base_blue: 2.0, ..smooth() };
     let (blue, opacity) = lit_ball(begun(0.94, 0.0), &once, 0.0);
     assert!(blue[2] > 2.0 * blue[0] && blue[2] > 0.0 && opacity == 0.0, "{blue:?} {opacity}");
     let (brighter, _) = lit_ball(begun(0.94, 0.0), &twice, 0.0);

@@ -5,7 +5,8 @@ use super::*;
 #[test]
 fn the_papers_sprites_add_up_and_fall_off_as_poly6() {
     let view = view(camera());
-    let rendering = RenderingParameters { sprite: SpriteStyle::Poly6, opacity: 0.1, ..RenderingParameters::default() };
+    let rendering =
+        GasRenderingParameters { sprite: SpriteStyle::Poly6, opacity: 0.1, ..GasRenderingParameters::default() };
     let one = drawn(&cloud([ball(0, [0.0; 3], 1800.0, 0.0)]), &rendering, &view, 0, None);
     let two =
         drawn(&cloud([ball(0, [0.0; 3], 1800.0, 0.0), ball(1, [0.0; 3], 1800.0, 0.0)]), &rendering, &view, 0, None);
@@ -19,7 +20,8 @@ fn the_papers_sprites_add_up_and_fall_off_as_poly6() {
 
 #[test]
 fn the_papers_sprites_hide_as_much_as_their_gas_is_dense() {
-    let rendering = RenderingParameters { sprite: SpriteStyle::Poly6, opacity: 0.3, ..RenderingParameters::default() };
+    let rendering =
+        GasRenderingParameters { sprite: SpriteStyle::Poly6, opacity: 0.3, ..GasRenderingParameters::default() };
     let thin = ball(0, [-0.5, 0.0, 0.0], 1800.0, 0.0);
     let dense = Particle { density: 3.0 * thin.density, ..ball(1, [0.5, 0.0, 0.0], 1800.0, 0.0) };
     let view = view(camera());
@@ -38,11 +40,11 @@ fn the_papers_sprites_hide_as_much_as_their_gas_is_dense() {
 fn the_papers_haze_is_the_gradient_of_poly6_for_every_particle_alike() {
     let view = view(camera());
     let scale = view.camera.focal_pixels / DISTANCE;
-    let rendering = RenderingParameters {
+    let rendering = GasRenderingParameters {
         sprite: SpriteStyle::Poly6,
         heat_haze_model: HeatHazeModel::Poly6,
         heat_haze_gain: 5.0,
-        ..RenderingParameters::default()
+        ..GasRenderingParameters::default()
     };
     // Of a liter of air at 1500 K: 0.2354 kg/m^3, whatever the density of the gas is now.
     let volume = 0.0002 / (1.2041 * 293.15 / 1500.0);
@@ -69,7 +71,7 @@ fn the_papers_haze_is_the_gradient_of_poly6_for_every_particle_alike() {
 #[test]
 fn squares_are_redder_where_gas_is_denser() {
     let view = view(camera());
-    let rendering = RenderingParameters { sprite: SpriteStyle::Squares, ..RenderingParameters::default() };
+    let rendering = GasRenderingParameters { sprite: SpriteStyle::Squares, ..GasRenderingParameters::default() };
     let dense = Particle { density: 0.4, ..ball(1, [0.5, 0.0, 0.0], 1800.0, 0.0) };
     let strip = drawn(&cloud([ball(0, [-0.5, 0.0, 0.0], 1800.0, 0.0), dense]), &rendering, &view, 0, None);
     let scale = view.camera.focal_pixels / DISTANCE;

@@ -1,9 +1,9 @@
-//! Where gas of different birth meets, detail has no seam.
+//! Where gas that was spawned at different points meets, detail has no seam.
 
 use super::*;
 
-/// A wall of gas before the camera; what lies to the right was born `apart` from there.
-fn wall(apart: [f32; 3]) -> Particles {
+/// A wall of gas in front of the camera. The spawn points of the gas in its right half are displaced by `apart`.
+fn wall(apart: [f32; 3]) -> GasParticles {
     let mut particles = cloud((0..6000).map(|id| {
         let [x, y, z, _] = Key::new(8, "wall").uniforms(id, 0, Purpose::named("place")).map(|u| u - 0.5);
         ball(id, [2.4 * x, 1.8 * y, 0.2 * z], 1750.0, 1.5e-7)
@@ -18,9 +18,9 @@ fn wall(apart: [f32; 3]) -> Particles {
 }
 
 /// Mean and greatest change of luminance from pixel to pixel near the middle column, beside the mean luminance.
-fn roughness(particles: &Particles) -> [f64; 2] {
+fn roughness(particles: &GasParticles) -> [f64; 2] {
     let view = view(camera());
-    let strip = drawn(particles, &RenderingParameters::default(), &view, 0, None);
+    let strip = drawn(particles, &GasRenderingParameters::default(), &view, 0, None);
     let (mut light, mut changes, mut greatest, mut count) = (0.0, 0.0, 0.0_f64, 0.0);
     for (x, y) in (20..100).flat_map(|y| (74..86).map(move |x| (x, y))) {
         let here = luminance(&strip, x, y);

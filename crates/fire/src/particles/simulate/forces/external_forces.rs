@@ -23,7 +23,7 @@ use crate::particles::{
     parameters::{FlameParticlesParameters, WindForce},
     simulate::{
         derived::DerivedConstants,
-        particles::Particles,
+        particles::GasParticles,
         vectors::{add_scaled, length, subtract},
     },
 };
@@ -72,7 +72,12 @@ pub(crate) struct ExternalForces<'a> {
 
 impl<'a> ExternalForces<'a> {
     /// The external forces of a step that begins at `t`.
-    pub(crate) fn new(step: StepConstants<'a>, particles: &Particles, surroundings: &'a Surroundings, t: f64) -> Self {
+    pub(crate) fn new(
+        step: StepConstants<'a>,
+        particles: &GasParticles,
+        surroundings: &'a Surroundings,
+        t: f64,
+    ) -> Self {
         let StepConstants { parameters: flame, constants, .. } = step;
         let plume_axes =
             plume_axes(&constants.burners, particles.positions(), &particles.burner, flame.forces.plume_contraction, t);
@@ -140,7 +145,7 @@ impl<'a> StepConstants<'a> {
 }
 
 /// Bounding box of the particles of each burner.
-fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
+fn bounds(particles: &GasParticles, burners: usize) -> Vec<[Vec3; 2]> {
     const EMPTY: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
     let [x, y, z] = particles.positions();
     let of_task = |first: usize| {
@@ -159,7 +164,7 @@ fn bounds(particles: &Particles, burners: usize) -> Vec<[Vec3; 2]> {
         bounds
     };
     let tasks = (0..particles.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
-    let bounds = tasks.map(of_task).reduce(|| vec![EMPTY; burners], merge);
+    let bounds = tasks.map(of_task).reduce_with(merge).unwrap_or_else(|| vec![EMPTY; burners]);
     // A burner without particles gets a unit box: its wind is not used.
     bounds.into_iter().map(|bounds| if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO, Vec3::ONE] }).collect()
 }

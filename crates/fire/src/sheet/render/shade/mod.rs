@@ -3,11 +3,14 @@
 use bansho_base::{camera::upright_quad::UprightQuad, math::simd::Lanes};
 use fearless_simd::Simd;
 
-use super::projection::{PixelToSheet, SheetCoordinates};
+use super::{
+    cells::ProjectedCells,
+    projection::{PixelToSheet, SheetCoordinates},
+};
 use crate::sheet::{
     animate::warp::WarpState,
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
-    texture::Texture,
+    texture::FlameTexture,
 };
 
 pub(crate) mod flame;
@@ -21,8 +24,8 @@ pub(crate) struct SheetState {
     /// Edges, center line and scroll.
     pub(crate) warp: WarpState,
     /// T0.
-    pub(crate) texture: Texture,
-    /// Size of a pixel in x' and in y.
+    pub(crate) texture: FlameTexture,
+    /// Size of a pixel, or of a cell, in x' and in y.
     pub(crate) pixel: [f32; 2],
 }
 
@@ -46,6 +49,8 @@ pub(crate) struct TimeSample {
     pub(crate) state: SheetState,
     /// Properties of smoke; `None` for a flame.
     pub(crate) smoke: Option<SmokeState>,
+    /// Its cells in the picture if it is small; its state is then that of cells instead of pixels.
+    pub(crate) cells: Option<ProjectedCells>,
     /// Luminance of the brightest color divided by the number of time samples, cd/m^2.
     pub(crate) luminance: f32,
 }

@@ -1,7 +1,7 @@
 //! The soot field as a whole: an undisturbed plume, Kirchhoff's law, light, depth, strips and loops.
 
 use bansho_base::{
-    camera::Lens,
+    camera::{CameraParameters, Lens},
     color,
     host::observer::Unobserved,
     image::Rect,
@@ -9,13 +9,14 @@ use bansho_base::{
     parameters::{Auto, animated::Animated},
     phenomenon::{
         Run,
-        strip::{DepthInterval, Shutter, Strip},
+        strip::{DepthInterval, Shutter, Strip, View},
         surroundings::Emitter,
     },
 };
 
 use crate::sheet::{
-    FlameSheet, FlameSheetParameters, Instance, ShapeParameters, SheetMethod, SootFieldParameters, Stage,
+    FlameSheet, FlameSheetParameters, InstanceParameters, SheetMethod, SheetShapeParameters, SheetStage,
+    SootFieldParameters,
     soot_field::plume,
     tests::{SIZE, draw, sheet, view, with_wind},
 };
@@ -25,7 +26,7 @@ fn still_fire(field: SootFieldParameters) -> FlameSheetParameters {
     FlameSheetParameters {
         method: SheetMethod::SootField,
         soot_field: field,
-        shape: ShapeParameters { sway: 0.0, flicker: 0.0, ..ShapeParameters::default() },
+        shape: SheetShapeParameters { sway: 0.0, flicker: 0.0, ..SheetShapeParameters::default() },
         wind_response: 0.0,
         time_samples: Auto::Set(1),
         ..FlameSheetParameters::default()
@@ -69,6 +70,18 @@ fn an_undisturbed_plume_is_the_closed_form() {
     assert_eq!(compared, 30);
 }
 
+/// A view of the lower half of the fire, which is so large in the picture that a pixel is one point of it.
+fn near_view(t: f64) -> View {
+    let far = view(Lens::Perspective, t);
+    let camera = CameraParameters {
+        position: Animated::from([0.3, 0.5, 3.0]),
+        target: Animated::from([0.0, 0.4, 0.0]),
+        vertical_fov_deg: Animated::from(8.0),
+        ..far.camera_parameters
+    };
+    View::new(camera, far.shutter, far.next_middle, SIZE, 0)
+}
+
 #[test]
 fn light_is_that_of_a_black_body_times_the_opacity() {
     // Without light that it scatters, a pixel has B(T) (1 - exp(-tau)), with T and tau as the AOVs state.
@@ -76,7 +89,7 @@ fn light_is_that_of_a_black_body_times_the_opacity() {
     let parameters = still_fire(field);
     let core = parameters.color.core_temperature_k as f32;
     let scale = 12_000.0 / color::luminance(color::black_body().radiance(core));
-    let planes = draw(&sheet(parameters, None), &view(Lens::Perspective, 2.0), SIZE[1], None);
+    let planes = draw(&sheet(parameters, None), &near_view(2.0), SIZE[1], None);
     let most = planes[1].iter().copied().fold(0.0, f32::max);
     let mut compared = 0;
     for index in 0..planes[0].len() {
@@ -177,8 +190,8 @@ fn strips_crops_and_lenses_draw_the_same_finite_field() {
         FlameSheetParameters {
             method: SheetMethod::SootField,
             instances: vec![
-                Instance::default(),
-                Instance { position: [0.4, 0.0, -0.6], scale: 0.7, ..Instance::default() },
+                InstanceParameters::default(),
+                InstanceParameters { position: [0.4, 0.0, -0.6], scale: 0.7, ..InstanceParameters::default() },
             ],
             time_samples: Auto::Set(2),
             ..FlameSheetParameters::default()
@@ -226,7 +239,7 @@ fn a_seamless_loop_of_the_field_ends_where_it_began() {
 fn a_stage_of_the_texture_is_refused() {
     let parameters = FlameSheetParameters {
         method: SheetMethod::SootField,
-        stage: Stage::Colored,
+        stage: SheetStage::Colored,
         ..FlameSheetParameters::default()
     };
     let fault = FlameSheet::new(parameters, "test", 1, None).unwrap_err();

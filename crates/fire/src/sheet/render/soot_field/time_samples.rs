@@ -16,9 +16,11 @@ use crate::sheet::{
     animate::warp::WarpState,
     model::{FlameInstance, FlameSheet},
     render::{
+        cells::{ProjectedCells, SheetCells, small_height},
+        draw_cells::CellSample,
         emitted_light::{ROWS, RowIntensities},
         projection::{PixelToSheet, SheetCoordinates, bounds},
-        shade::smoke::LIGHT_SAMPLES,
+        shade::{ShadedBatch, smoke::LIGHT_SAMPLES},
         smoke::Scattering,
         time_samples::pixels_per_meter,
     },
@@ -36,16 +38,45 @@ pub(crate) struct SootSample {
     pub(super) quad: UprightQuad,
     /// Its state at that time.
     pub(super) state: SootState,
+    /// Its cells in the picture if it is small.
+    pub(crate) cells: Option<ProjectedCells>,
+}
+
+impl CellSample for SootSample {
+    fn cells(&self) -> Option<&ProjectedCells> {
+        self.cells.as_ref()
+    }
+
+    fn shade<S: Simd>(&self, sheet: &FlameSheet, batch: &SheetCoordinates<S>) -> Option<ShadedBatch<S>> {
+        let tables = sheet.soot_field()?;
+        batch.x.simd.vectorize(
+            #[inline(always)]
+            || shade_soot(&tables.plume, &self.state, batch),
+        )
+    }
+
+    fn luminance(&self, samples: usize) -> f32 {
+        1.0 / samples as f32
+    }
+
+    fn temperature(&self, _sheet: &FlameSheet, t1: f32) -> Option<f32> {
+        Some(t1)
+    }
+
+    fn geometry(&self) -> (&UprightQuad, &WarpState) {
+        (&self.quad, &self.state.warp)
+    }
 }
 
 impl FlameSheet {
-    /// The time samples of a soot field, and the bounding rectangle of its pixels.
+    /// The time samples of a soot field, and the bounding rectangle of its pixels. The samples of a small one have cells, `grid`.
     pub(crate) fn soot_samples(
         &self,
         flame: &FlameInstance,
         view: &View,
         surroundings: &Surroundings,
         count: usize,
+        grid: Option<SheetCells>,
     ) -> (Vec<SootSample>, Rect) {
         let (mut samples, mut rect) = (Vec::with_capacity(count), Rect::default());
         let Some(tables) = self.soot_field() else { return (samples, rect) };
@@ -59,17 +90,33 @@ impl FlameSheet {
             let (quad, warp) = self.evaluate_at(flame, right, surroundings.wind, t);
             let Some(pixel_to_sheet) = PixelToSheet::new(&camera, &quad) else { continue };
             let [low, high] = warp.center_range;
-            rect = rect.union(&bounds(&camera, &quad, low.min(0.0), 1.0 + high.max(0.0), 1.0, view.size));
+            let sides = [low.min(0.0), 1.0 + high.max(0.0)];
+            let cells = grid.and_then(|grid| ProjectedCells::new(&camera, &quad, sides, grid));
+            if grid.is_some() && cells.is_none() {
+                // A part of it cannot be projected, as when it is beside or behind the camera.
+                return self.soot_samples(flame, view, surroundings, count, None);
+            }
+            let seen = match &cells {
+                Some(cells) => cells.bounds(view.size),
+                None => bounds(&camera, &quad, sides[0], sides[1], 1.0, view.size),
+            };
+            rect = rect.union(&seen);
             let (scattered, displacement) = common.get_or_insert_with(|| {
-                let height_pixels = pixels_per_meter(&camera, &quad) * quad.size.y;
+                let least = grid.map_or(0.0, |_| small_height(layers.texels_up()));
+                let height_pixels = least.max(pixels_per_meter(&camera, &quad) * quad.size.y);
                 let displacement = tables.displacement.filtered(&layers, height_pixels);
                 (self.soot_light(flame, &quad, view, surroundings), displacement)
             });
             let displacement = displacement.at(&layers, warp.scroll);
             let state = self.soot_state(warp, displacement, *scattered, t);
-            samples.push(SootSample { pixel_to_sheet, quad, state });
+            samples.push(SootSample { pixel_to_sheet, quad, state, cells });
         }
         (samples, rect)
+    }
+
+    /// Texels of the displacement per sheet height.
+    pub(crate) fn soot_texels_up(&self, flame: &FlameInstance) -> f64 {
+        layers(&self.parameters, flame.key, &self.clock).texels_up()
     }
 
     /// The state of a soot field at `t`.

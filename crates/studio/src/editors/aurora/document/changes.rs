@@ -19,7 +19,7 @@ use super::{
 
 /// An end of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SheetEnd {
+pub struct StrokeEnd {
     /// Index of the sheet.
     pub sheet: usize,
     /// Whether it is the last point rather than the first.
@@ -132,7 +132,7 @@ impl AuroraDrawing {
     }
 
     /// Merges two ends of the shape before `shape`; the sheets that they become are joined too.
-    pub fn merge(&self, shape: usize, ends: [SheetEnd; 2]) -> Vec<Operation> {
+    pub fn merge(&self, shape: usize, ends: [StrokeEnd; 2]) -> Vec<Operation> {
         let mut change = Table::default();
         let list = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
         change.push("sheets", list(ends.map(|end| end.sheet as i64 + 1)));
@@ -140,7 +140,7 @@ impl AuroraDrawing {
         let mut operations =
             vec![Operation::Append { path: self.shape(shape).key("merge"), value: Value::Table(change) }];
         let before = self.lines(shape - 1);
-        let at = |end: SheetEnd| {
+        let at = |end: StrokeEnd| {
             let line = before.get(end.sheet)?;
             if end.last { line.last().copied() } else { line.first().copied() }
         };
@@ -367,10 +367,10 @@ fn list_edits(path: &ValuePath, old: &[SheetParameters], new: &[SheetParameters]
     Some(operations)
 }
 
-fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<SheetEnd> {
+fn nearest_end(all: &[Vec<DVec2>], target: DVec2) -> Option<StrokeEnd> {
     let ends = all.iter().enumerate().flat_map(|(sheet, line)| {
         let end =
-            |last: bool, point: Option<&DVec2>| point.map(|point| (point.distance(target), SheetEnd { sheet, last }));
+            |last: bool, point: Option<&DVec2>| point.map(|point| (point.distance(target), StrokeEnd { sheet, last }));
         [end(false, line.first()), end(true, line.last())]
     });
     ends.flatten().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, end)| end)

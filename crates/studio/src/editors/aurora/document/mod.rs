@@ -21,7 +21,6 @@ use bansho::{
     base::{
         math::DVec2,
         parameters::{Parameters, ProblemKind, Reader, Table, Value},
-        phenomenon::kind::Describe,
     },
     scene::{
         ValuePath,
@@ -33,7 +32,7 @@ use bansho::{
 
 use crate::document::Document;
 
-pub use changes::SheetEnd;
+pub use changes::StrokeEnd;
 pub use links::{LinkedPoint, SheetPosition};
 pub use sheets::Factor;
 
@@ -74,7 +73,7 @@ impl AuroraDrawing {
     /// # Errors
     /// There is no such aurora, or its parameters or shapes are invalid.
     pub fn read(root: &Table, index: usize, assets: &Arc<dyn Assets>) -> Result<Self, ShapeEditError> {
-        let path = ValuePath::root().key(AuroraParameters::KEY).index(index);
+        let path = ValuePath::root().key(AuroraParameters::KIND.key).index(index);
         let Some(Value::Table(table)) = path.find(root).map(|node| &node.value) else {
             return Err(ShapeEditError::Missing);
         };

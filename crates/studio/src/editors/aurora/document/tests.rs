@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use bansho::{Assets, MemoryAssets, aurora::shapes::Form, base::math::DVec2};
 
-use super::{AuroraDrawing, Factor, LinkedPoint, ShapeEditError, SheetEnd, SheetPosition};
+use super::{AuroraDrawing, Factor, LinkedPoint, ShapeEditError, SheetPosition, StrokeEnd};
 use crate::document::Document;
 
 const ARC: &str = "\
@@ -35,8 +35,8 @@ fn at(sheet: usize, fraction: f64) -> SheetPosition {
     SheetPosition { sheet, fraction }
 }
 
-fn end(sheet: usize, last: bool) -> SheetEnd {
-    SheetEnd { sheet, last }
+fn end(sheet: usize, last: bool) -> StrokeEnd {
+    StrokeEnd { sheet, last }
 }
 
 fn is_valid(document: &mut Document) -> bool {
@@ -137,7 +137,7 @@ fn shapes_are_added_timed_and_removed() {
     let drawing = change(&mut document, &drawing.remove_shape(1));
     assert_eq!(drawing.arrivals().len(), 1);
     assert!(is_valid(&mut document));
-    // What comes first then is there from the beginning, in one piece or two.
+    // A shape after a split that becomes the first one has no transition.
     let drawing = change(&mut document, &drawing.add_shape());
     let drawing = change(&mut document, &drawing.retime(1, 2.5));
     let drawing = change(&mut document, &drawing.split(1, 0, 0.4));

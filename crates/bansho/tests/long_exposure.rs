@@ -1,0 +1,354 @@
+//! Motion in the open shutter: of everything that is drawn, one long exposure is the mean of twenty short ones, whether the camera moves, the thing, or
+//! both.
+#![cfg(all(feature = "fire", feature = "rain", feature = "aurora"))]
+
+use std::sync::Arc;
+
+use bansho::{Frame, MemoryAssets, Plan, PlanOptions, Shot, compile_scene};
+use bansho_base::host::observer::Unobserved;
+
+/// Short exposures for each long one.
+const PARTS: u32 = 20;
+/// Largest difference from their mean, root mean square, relative to that of the mean.
+const TOLERANCE: f64 = 0.05;
+
+/// Width and height of the pictures.
+const SIZE: [usize; 2] = [192, 108];
+
+/// How the camera moves while the shutter is open. Each picture shows a few meters around the origin from 6 m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum CameraMotion {
+    Still,
+    /// A whip pan of 90 degrees per second.
+    Pan,
+    /// Toward the origin and to the side.
+    Dolly,
+    Roll,
+    Zoom,
+}
+
+impl CameraMotion {
+    /// The table `[camera]`, moving from 0 to 1/48 s.
+    fn table(self) -> &'static str {
+        match self {
+            Self::Still => "position = [0, 1.5, 6]\ntarget = [0, 1, 0]\n",
+            Self::Pan => {
+                "position = [0, 1.5, 6]\n\
+                 target = { keys = [[-1, [-9.47, 1, 0]], [1.0208333, [9.47, 1, 0]]], interpolation = \"linear\" }\n"
+            }
+            Self::Dolly => {
+                "position = { keys = [[0, [-0.1, 1.5, 6.1]], [0.0208333, [0.1, 1.5, 5.9]]], interpolation = \"linear\" }\n\
+                 target = [0, 1, 0]\n"
+            }
+            Self::Roll => {
+                "position = [0, 1.5, 6]\ntarget = [0, 1, 0]\n\
+                 roll_deg = { keys = [[0, -3], [0.0208333, 3]], interpolation = \"linear\" }\n"
+            }
+            Self::Zoom => {
+                "position = [0, 1.5, 6]\ntarget = [0, 1, 0]\n\
+                 vertical_fov_deg = { keys = [[0, 34], [0.0208333, 30]], interpolation = \"linear\" }\n"
+            }
+        }
+    }
+}
+
+/// A position that moves by 0.3 m to the right and 0.1 m down while the shutter is open.
+fn carried([x, y, z]: [f64; 3], shutter_s: f64) -> String {
+    let end = |sign: f64| format!("[{}, {}, {z}]", x + 0.15 * sign, y - 0.05 * sign);
+    format!("{{ keys = [[0, {}], [{shutter_s}, {}]], interpolation = \"linear\" }}", end(-1.0), end(1.0))
+}
+
+/// A fixed position.
+fn fixed(position: [f64; 3]) -> String {
+    format!("{position:?}")
+}
+
+/// Something that is drawn, with the position of what may be carried.
+struct Phenomenon {
+    name: &'static str,
+    /// Exposure time, s.
+    shutter_s: f64,
+    /// Tables of the scene for a position.
+    tables: fn(&str) -> String,
+    /// The position that is carried; `None` if nothing can be.
+    carried: Option<[f64; 3]>,
+    cameras: &'static [CameraMotion],
+}
+
+const USUAL_S: f64 = 1.0 / 48.0;
+const ALL_CAMERAS: &[CameraMotion] =
+    &[CameraMotion::Still, CameraMotion::Pan, CameraMotion::Dolly, CameraMotion::Roll, CameraMotion::Zoom];
+const TURNS: &[CameraMotion] = &[CameraMotion::Pan, CameraMotion::Roll, CameraMotion::Zoom];
+
+const DARK: &str = "[sky]\nluminance = 0.0\nvisible = false\n";
+
+const PHENOMENA: &[Phenomenon] = &[
+    Phenomenon {
+        name: "flame sheet",
+        shutter_s: USUAL_S,
+        tables: |position| format!("[[flame_sheet]]\nposition = {position}\nwidth = 0.5\nheight = 0.9\n"),
+        carried: Some([0.0, 0.6, 0.0]),
+        cameras: ALL_CAMERAS,
+    },
+    Phenomenon {
+        name: "flame sheet in a long exposure",
+        shutter_s: 0.32,
+        tables: |position| format!("[[flame_sheet]]\nposition = {position}\nwidth = 0.5\nheight = 0.9\n"),
+        carried: Some([0.0, 0.6, 0.0]),
+        cameras: &[CameraMotion::Still],
+    },
+    Phenomenon {
+        name: "smoke",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!(
+                "[sky]\nluminance = 5\n[[flame_sheet]]\nposition = {position}\nwidth = 0.5\nheight = 0.6\n\
+                 smoke.optical_depth = 2\n"
+            )
+        },
+        carried: Some([0.0, 0.3, 0.0]),
+        cameras: ALL_CAMERAS,
+    },
+    Phenomenon {
+        name: "soot field",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!("[[flame_sheet]]\nmethod = \"soot_field\"\nposition = {position}\nwidth = 0.5\nheight = 0.9\n")
+        },
+        carried: Some([0.0, 0.6, 0.0]),
+        cameras: ALL_CAMERAS,
+    },
+    Phenomenon {
+        name: "sparks",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!(
+                "[[flame_sheet]]\nposition = {position}\nwidth = 0.8\nheight = 0.9\ncolor.luminance = 0\n\
+                 sparks.rate = 200\n"
+            )
+        },
+        carried: None,
+        cameras: &[CameraMotion::Still, CameraMotion::Pan],
+    },
+    Phenomenon {
+        name: "lamp",
+        shutter_s: USUAL_S,
+        tables: |position| format!("[[light]]\nposition = {position}\nvisible = true\nradius = 0.04\nintensity = 50\n"),
+        carried: Some([0.5, 1.2, 0.0]),
+        cameras: ALL_CAMERAS,
+    },
+    Phenomenon {
+        name: "large lamp before the sky",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!(
+                "[sky]\nluminance = 50\ntrees_deg = 5\n\
+                 [[light]]\nposition = {position}\nvisible = true\nradius = 0.4\nintensity = 50\n"
+            )
+        },
+        carried: Some([0.5, 1.2, 0.0]),
+        cameras: ALL_CAMERAS,
+    },
+    Phenomenon {
+        name: "ground",
+        shutter_s: USUAL_S,
+        tables: |position| format!("[ground]\n[[light]]\nposition = {position}\nintensity = 90\n"),
+        carried: Some([0.5, 0.3, 2.0]),
+        cameras: ALL_CAMERAS,
+    },
+    Phenomenon {
+        name: "ground in a spot that turns",
+        shutter_s: USUAL_S,
+        tables: |_| {
+            "[ground]\n[[light]]\nkind = \"spot\"\nposition = [0, 3, 0]\nintensity = 900\nouter_cone_deg = 12\n\
+             direction = { keys = [[0, [-0.3, -1, 0]], [0.0208333, [0.3, -1, 0.1]]], interpolation = \"linear\" }\n"
+                .to_owned()
+        },
+        carried: None,
+        cameras: &[CameraMotion::Still],
+    },
+    Phenomenon {
+        name: "wet ground",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!(
+                "[ground]\nwetness = 0.9\n[[light]]\nposition = {position}\nvisible = true\nradius = 0.1\nintensity = 90\n"
+            )
+        },
+        carried: Some([0.5, 1.2, 0.0]),
+        cameras: &[CameraMotion::Still, CameraMotion::Pan, CameraMotion::Dolly, CameraMotion::Zoom],
+    },
+    Phenomenon {
+        name: "lake",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!(
+                "[ground]\nkind = \"water\"\n[sky]\nluminance = 1\n\
+                 [[flame_sheet]]\nposition = {position}\nwidth = 0.8\nheight = 0.9\n"
+            )
+        },
+        carried: Some([0.0, 0.5, 0.0]),
+        cameras: ALL_CAMERAS,
+    },
+    Phenomenon {
+        name: "lake in a long exposure",
+        shutter_s: 0.32,
+        tables: |position| {
+            format!(
+                "[ground]\nkind = \"water\"\n[sky]\nluminance = 1\n\
+                 [[flame_sheet]]\nposition = {position}\nwidth = 0.8\nheight = 0.9\n"
+            )
+        },
+        carried: Some([0.0, 0.5, 0.0]),
+        cameras: &[CameraMotion::Still],
+    },
+    Phenomenon {
+        name: "obstacle and its shadow",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!(
+                "[ground]\n[[light]]\nposition = [1.5, 3, 2]\nintensity = 900\n\
+                 [[obstacle]]\nvisible = true\nposition = {position}\nradius = 0.4\n"
+            )
+        },
+        carried: Some([0.0, 0.6, 0.0]),
+        cameras: &[CameraMotion::Still, CameraMotion::Pan, CameraMotion::Dolly],
+    },
+    Phenomenon {
+        name: "obstacle in the light of a lamp",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!(
+                "[[light]]\nposition = {position}\nintensity = 90\n\
+                 [[obstacle]]\nvisible = true\nposition = [0, 0.8, 0]\nradius = 0.6\n"
+            )
+        },
+        carried: Some([0.5, 1.2, 0.6]),
+        cameras: &[CameraMotion::Still, CameraMotion::Pan],
+    },
+    Phenomenon {
+        name: "flame before an obstacle on lit ground",
+        shutter_s: USUAL_S,
+        tables: |position| {
+            format!(
+                "[sky]\nluminance = 5\ntrees_deg = 5\n[ground]\n\
+                 [[obstacle]]\nvisible = true\nposition = [0.2, 0.5, -0.8]\nradius = 0.5\n\
+                 [[flame_sheet]]\nposition = {position}\nwidth = 0.4\nheight = 0.8\n"
+            )
+        },
+        carried: Some([0.0, 0.5, 0.0]),
+        cameras: ALL_CAMERAS,
+    },
+    Phenomenon {
+        name: "sky with trees",
+        shutter_s: USUAL_S,
+        tables: |_| "[sky]\nluminance = 50\ntrees_deg = 8\n".to_owned(),
+        carried: None,
+        cameras: TURNS,
+    },
+    Phenomenon {
+        name: "stars",
+        shutter_s: USUAL_S,
+        tables: |_| "[sky]\nkind = \"night\"\n".to_owned(),
+        carried: None,
+        cameras: TURNS,
+    },
+    Phenomenon {
+        name: "aurora",
+        shutter_s: USUAL_S,
+        tables: |_| {
+            "shift = [0.0, 1.2]\n[[aurora]]\nparticles = { count = 5000 }\n[sky]\nkind = \"night\"\nnight = { stars = 0 }\n".to_owned()
+        },
+        carried: None,
+        cameras: TURNS,
+    },
+];
+
+/// A frame of a scene.
+fn draw(phenomenon: &Phenomenon, camera: CameraMotion, position: &str, [shutter_s, start_s]: [f64; 2]) -> Frame {
+    let tables = (phenomenon.tables)(position);
+    let dark = if tables.contains("[sky]") { "" } else { DARK };
+    let text = format!(
+        "bansho = 2\n[picture]\nsize = {SIZE:?}\nfps = 24\nexposure_ev100 = 3\n\
+         [camera]\n{}shutter_s = {shutter_s}\nshutter_offset_s = {start_s}\n{dark}{tables}",
+        camera.table()
+    );
+    let compiled = compile_scene(phenomenon.name, &text, Arc::new(MemoryAssets::default()))
+        .unwrap_or_else(|error| panic!("{error}"));
+    let plan = Arc::new(Plan::new(&compiled, &PlanOptions::default()).unwrap());
+    bansho::draw(&mut Shot::open(compiled, plan), 0, &Unobserved).unwrap()
+}
+
+/// Root mean square of a long exposure minus the mean of short ones, relative to that of the mean: of the light or of alpha, whichever is larger.
+fn difference(phenomenon: &Phenomenon, camera: CameraMotion, position: &str) -> f64 {
+    let shutter_s = phenomenon.shutter_s;
+    let long = draw(phenomenon, camera, position, [shutter_s, 0.0]);
+    let mut mean = vec![0.0; long.beauty.pixels().len() * 4];
+    for index in 0..PARTS {
+        let part_s = shutter_s / f64::from(PARTS);
+        let short = draw(phenomenon, camera, position, [part_s, f64::from(index) * part_s]);
+        let values = short.beauty.pixels().as_flattened();
+        mean.iter_mut().zip(values).for_each(|(sum, value)| *sum += f64::from(*value) / f64::from(PARTS));
+    }
+    let relative = |channels: std::ops::Range<usize>| {
+        let values = long.beauty.pixels().as_flattened().iter().map(|value| f64::from(*value)).zip(&mean).enumerate();
+        let (mut error, mut size) = (0.0, 0.0);
+        for (_, (long, mean)) in values.filter(|(index, _)| channels.contains(&(index % 4))) {
+            error += (long - mean) * (long - mean);
+            size += mean * mean;
+        }
+        (size > 0.0).then(|| (error / size).sqrt())
+    };
+    let color = relative(0..3).unwrap_or_else(|| panic!("{}: something is seen", phenomenon.name));
+    color.max(relative(3..4).unwrap_or(0.0))
+}
+
+/// Compares the phenomena whose names contain one of some words, and fails with a table of all of them.
+fn check(words: &[&str]) {
+    let mut table = String::new();
+    let mut is_blurred = true;
+    for phenomenon in PHENOMENA.iter().filter(|each| words.iter().any(|word| each.name.starts_with(word))) {
+        let still = fixed(phenomenon.carried.unwrap_or_default());
+        let moving = phenomenon.carried.map(|at| (carried(at, phenomenon.shutter_s), "carried"));
+        for (position, thing) in std::iter::once((still, "still")).chain(moving) {
+            for &camera in phenomenon.cameras {
+                let found = difference(phenomenon, camera, &position);
+                is_blurred &= found < TOLERANCE;
+                let mark = if found < TOLERANCE { "" } else { " <-" };
+                table += &format!("{:45} {thing:8} camera {camera:6?} {found:.4}{mark}\n", phenomenon.name);
+            }
+        }
+    }
+    assert!(!table.is_empty(), "{words:?} are in the list");
+    assert!(is_blurred, "root mean square difference, relative:\n{table}");
+}
+
+#[test]
+fn long_exposures_of_flames_are_the_mean_of_short_ones() {
+    check(&["flame sheet", "smoke", "soot field", "sparks"]);
+}
+
+#[test]
+fn long_exposures_of_lamps_are_the_mean_of_short_ones() {
+    check(&["lamp", "large lamp"]);
+}
+
+#[test]
+fn long_exposures_of_ground_are_the_mean_of_short_ones() {
+    check(&["ground", "wet ground"]);
+}
+
+#[test]
+fn long_exposures_of_lakes_are_the_mean_of_short_ones() {
+    check(&["lake"]);
+}
+
+#[test]
+fn long_exposures_of_obstacles_are_the_mean_of_short_ones() {
+    check(&["obstacle", "flame before an obstacle"]);
+}
+
+#[test]
+fn long_exposures_of_the_sky_are_the_mean_of_short_ones() {
+    check(&["sky", "stars", "aurora"]);
+}

@@ -1,0 +1,153 @@
+//! A prepared frame of fog.
+
+use bansho_base::{
+    camera::directions::Directions,
+    image::Rect,
+    math::{
+        DVec3, approximations,
+        simd::{LANES, LaneArray, Real},
+    },
+    phenomenon::{
+        Prepared,
+        strip::{DepthInterval, Strip, View},
+        surroundings::{Occluder, Surroundings},
+    },
+    world::sky::Sky,
+};
+use fearless_simd::{Level, dispatch};
+
+use super::light_in_fog::{LightInFog, Segments};
+
+/// Fog in one frame.
+pub(super) struct PreparedFog<'a> {
+    level: Level,
+    /// Extinction coefficient, 1/m.
+    extinction: f32,
+    view: &'a View,
+    sky: Sky,
+    lights: Vec<LightInFog>,
+    /// Height of the camera above the ground, at which lines of sight end, m; infinite without one.
+    height: f32,
+    /// Height of the mirror above the camera in a mirrored view, m: fog between the two dims the mirror itself.
+    mirror: Option<f32>,
+}
+
+/// Optical depth behind which nothing is seen: 1e-9 of the light is left.
+const OPAQUE: f32 = 20.0;
+/// Fog has no depth of its own.
+const NO_DEPTH: [f32; LANES] = [f32::INFINITY; LANES];
+
+impl<'a> PreparedFog<'a> {
+    pub(super) fn new(extinction: f64, view: &'a View, surroundings: &Surroundings) -> Self {
+        let camera = view.camera.position;
+        let level_height = |solid: &Occluder| match solid {
+            Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
+            _ => None,
+        };
+        let ground = surroundings.others.occluders.iter().filter_map(level_height).max_by(f64::total_cmp);
+        let height = ground.map(|ground| camera.y - ground).filter(|height| *height > 0.0);
+        Self {
+            level: bansho_base::math::simd::level(),
+            extinction: extinction as f32,
+            view,
+            sky: surroundings.sky,
+            lights: surroundings.others.lights.iter().filter_map(|light| LightInFog::new(light, camera)).collect(),
+            height: height.map_or(f32::INFINITY, |height| height as f32),
+            mirror: view.mirror.map(|mirror| (mirror - camera.y) as f32),
+        }
+    }
+
+    /// The parts of sixteen lines of sight that are within a slice and in front of the plate (depths, m) and the ground.
+    #[inline(always)]
+    fn segments(&self, directions: &mut Directions, slice: &DepthInterval, plate: &LaneArray) -> Segments {
+        let lengths = directions.normalize();
+        let (near, far) = (slice.near as f32, slice.far as f32);
+        let (mut begin, mut end) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let climb = directions.components[1][i];
+            let ground = if climb < 0.0 { self.height / -climb } else { f32::INFINITY };
+            let start =
+                self.mirror.map_or(0.0, |height| if climb > 0.0 { (height / climb).simd_max(0.0) } else { 0.0 });
+            let from = (near * lengths[i]).simd_max(start);
+            let to = (plate[i].simd_min(far) * lengths[i]).simd_min(ground);
+            begin[i] = if directions.visible[i] { from } else { 0.0 };
+            end[i] = if directions.visible[i] { to.simd_max(from) } else { 0.0 };
+        }
+        Segments { directions: directions.components, begin, end }
+    }
+
+    /// Radiance and opacity of sixteen segments.
+    #[inline(always)]
+    fn layer(&self, segments: &Segments) -> ([LaneArray; 3], LaneArray) {
+        let (mut opacity, mut any_seen) = ([0.0; LANES], false);
+        for i in 0..LANES {
+            let width = segments.end[i] - segments.begin[i];
+            opacity[i] = if width > 0.0 { 1.0 - approximations::exp(-self.extinction * width) } else { 0.0 };
+            any_seen |= (opacity[i] > 0.0) & (self.extinction * segments.begin[i] < OPAQUE);
+        }
+        let mut light = [[0.0; LANES]; 3];
+        if any_seen {
+            self.add_airlight(segments, &opacity, &mut light);
+            // A loop, not `for_each`: its closure would be compiled without the vector instructions of this function.
+            for source in &self.lights {
+                source.add(segments, self.extinction, &mut light);
+            }
+        }
+        for i in 0..LANES {
+            // What is farther is hidden by the fog itself, and its segments only close what is behind them.
+            let is_seen = (opacity[i] > 0.0) & (self.extinction * segments.begin[i] < OPAQUE);
+            for c in 0..3 {
+                light[c][i] = if is_seen { light[c][i] } else { 0.0 };
+            }
+        }
+        (light, opacity)
+    }
+
+    /// Koschmieder's airlight: an endless medium has the radiance of the sky in that direction, below the horizon that at the horizon; what is within a
+    /// segment has the share of it that is lost behind.
+    #[inline(always)]
+    fn add_airlight(&self, segments: &Segments, opacity: &LaneArray, light: &mut [LaneArray; 3]) {
+        let [xs, ys, zs] = &segments.directions;
+        for i in 0..LANES {
+            if opacity[i] > 0.0 {
+                let direction = DVec3::new(f64::from(xs[i]), f64::from(ys[i].max(0.0)), f64::from(zs[i]));
+                let endless = self.sky.radiance(direction.normalize_or_zero());
+                for c in 0..3 {
+                    light[c][i] += endless[c] * opacity[i];
+                }
+            }
+        }
+    }
+
+    /// Draws a row of a strip, in batches that begin at the same columns whatever is drawn of the picture.
+    #[inline(always)]
+    fn draw_row(&self, y: usize, slice: &DepthInterval, strip: &mut Strip) {
+        let rect = strip.rect;
+        for x in (rect.x / LANES * LANES..rect.right()).step_by(LANES) {
+            let drawn = x.max(rect.x)..(x + LANES).min(rect.right());
+            let first = (y - rect.y) * rect.width + drawn.start - rect.x;
+            let mut plate = NO_DEPTH;
+            for column in drawn.clone() {
+                plate[column - x] = strip.plate_depth(first + column - drawn.start);
+            }
+            let mut directions = Directions::new(&self.view.camera, x, y);
+            let segments = self.segments(&mut directions, slice, &plate);
+            let (light, opacity) = self.layer(&segments);
+            let part = drawn.start - x..drawn.end - x;
+            let [red, green, blue] = light.each_ref().map(|plane| &plane[part.clone()]);
+            strip.add_row_behind(first, [red, green, blue], Some(&opacity[part.clone()]), &NO_DEPTH[part]);
+        }
+    }
+}
+
+impl Prepared for PreparedFog<'_> {
+    fn bounds(&self, _slice: &DepthInterval) -> Rect {
+        Rect::from_size(self.view.size[0], self.view.size[1])
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        for y in strip.rect.y..strip.rect.bottom() {
+            dispatch!(self.level, _simd => self.draw_row(y, slice, strip));
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The table `[[light]]`.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    parameters::{BuildError, ProblemKind},
+    phenomenon::{Phenomenon, strip::Shutter, surroundings::Light},
+    tables::{BuildContext, BuiltTable, SharedRole, SharedTable, TableCount, TableKind},
+};
+
+use super::{Lamp, Lamps, LightKind, LightParameters};
+
+impl LightParameters {
+    /// The table `[[light]]`.
+    pub const KIND: TableKind = TableKind {
+        layer: Some(Lamps::NAME),
+        ..TableKind::shared::<Self>(
+            "light",
+            TableCount::List,
+            SharedRole {
+                draw: Some(draw),
+                draw_order: 10,
+                fingerprint_order: 10,
+                implied_unless: Some(&["sky", "ground"]),
+                ..SharedRole::new::<Self>()
+            },
+        )
+    };
+}
+
+impl SharedTable for LightParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
+
+    /// A directed light needs a direction, and the inner cone of a spot must not exceed its outer cone. An inner cone that the file does not state is
+    /// limited to the outer one.
+    fn conflicts(&self, is_stated: &dyn Fn(&str) -> bool) -> Vec<BuildError> {
+        let error = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
+        let mut errors = Vec::new();
+        if self.is_directed() && !self.has_valid_direction() {
+            let reason = "is no direction; allowed: any three numbers that are not all 0".to_owned();
+            errors.push(error("direction", reason));
+        }
+        let is_wider = self.inner_cone_deg > self.outer_cone_deg;
+        if self.kind == LightKind::Spot && is_wider && is_stated("inner_cone_deg") {
+            let reason = format!(
+                "a spot with full intensity up to {} degrees cannot end at {}; allowed: up to `outer_cone_deg`",
+                self.inner_cone_deg, self.outer_cone_deg
+            );
+            errors.push(error("inner_cone_deg", reason));
+        }
+        errors
+    }
+
+    fn hide(&mut self) -> bool {
+        self.visible = false;
+        true
+    }
+
+    fn is_visible(&self) -> bool {
+        self.visible
+    }
+
+    fn light(&self, t: f64) -> Option<Light> {
+        Some(self.at(t))
+    }
+
+    fn light_parts(&self, shutter: Shutter) -> usize {
+        self.parts_of_exposure(shutter)
+    }
+}
+
+fn draw(tables: &[BuiltTable], _context: &BuildContext) -> Arc<dyn Phenomenon> {
+    let lights: Vec<LightParameters> = tables.iter().filter_map(BuiltTable::parameters).cloned().collect();
+    let at = move |t| lights.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect();
+    Arc::new(Lamps::new(at))
+}
