@@ -52,6 +52,13 @@ const SHINING: &[Shining] = &[
         tolerance: 0.02,
     },
     Shining {
+        // Before and behind soot that hides most of what is behind it: the camera's pitch must not move a spark from one side to the other.
+        name: "sparks around a dark sheet of soot",
+        tables: "[[flame_sheet]]\nposition = [0, -1.5, -4]\nwidth = 3\nheight = 3\ncolor = { luminance = 0, soot_optical_depth = 4 }\nlight.scale = 0\n\
+                 sparks = { rate = 400, diameter = 0.02, speed = 1.0, swirl = 0.4 }\n",
+        tolerance: 0.03,
+    },
+    Shining {
         name: "a flame sheet",
         tables: "[[flame_sheet]]\nposition = [0, -0.5, -4]\nwidth = 0.7\nheight = 1.2\nlight.scale = 0\n",
         tolerance: 0.05,

@@ -56,6 +56,31 @@ struct Spark {
     turns: f64,
 }
 
+/// The upright plane of a flame sheet, which hides the sparks behind it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SheetPlane {
+    /// A point of the plane, m.
+    pub(crate) point: DVec3,
+    /// Its horizontal normal toward the camera.
+    pub(crate) normal: DVec3,
+    /// Depth at which the whole sheet is drawn, m.
+    pub(crate) depth: f64,
+}
+
+impl SheetPlane {
+    /// The depth at which a spark is sorted, m: on the same side of the sheet's single depth as the spark is of the plane.
+    ///
+    /// The depths of an upright plane change along it where the camera looks up or down, so that a spark before its upper part may have a greater depth than
+    /// the sheet's middle.
+    fn sorting_depth(&self, position: DVec3, depth: f64) -> f64 {
+        if (position - self.point).dot(self.normal) > 0.0 {
+            depth.min(self.depth.next_down())
+        } else {
+            depth.max(self.depth.next_up())
+        }
+    }
+}
+
 /// Emitter of a fire's sparks during one exposure.
 pub(crate) struct SparkEmitter<'a> {
     pub(crate) parameters: &'a SparkParameters,
@@ -75,6 +100,8 @@ pub(crate) struct SparkEmitter<'a> {
     pub(crate) scale: f64,
     /// Sensitivity to the wind.
     pub(crate) wind_response: f64,
+    /// The sheet among whose sparks these are; `None` for other fires.
+    pub(crate) sheet: Option<SheetPlane>,
 }
 
 impl SparkEmitter<'_> {
@@ -109,7 +136,7 @@ impl SparkEmitter<'_> {
 
     /// The interval of depth of the sparks that are visible in the exposure; `None` without any.
     pub(crate) fn depths(&self, view: &View, wind: &Wind) -> Option<DepthInterval> {
-        let depths = self.streaks(view, wind).into_iter().map(|streak| streak.depth);
+        let depths = self.streaks(view, wind).into_iter().map(|streak| streak.sorting_depth);
         let join = |all: DepthInterval, one: DepthInterval| DepthInterval {
             near: all.near.min(one.near),
             far: all.far.max(one.far),
@@ -194,14 +221,16 @@ impl SparkEmitter<'_> {
             let camera = view.camera_at(at);
             let age = (spark.age + at - t).clamp(0.0, spark.lifetime_s);
             let position = origin + self.displacement(spark, age) + self.drift(wind, origin, at, age);
-            Some((camera.project_beyond_circle(position)?, (position - camera.position).length_squared()))
+            Some((camera.project_beyond_circle(position)?, position, (position - camera.position).length_squared()))
         };
         let glow = self.glow(spark, view.shutter);
-        let (Some((opened, opened_square)), Some((closed, closed_square))) =
+        let (Some((opened, from, opened_square)), Some((closed, to, closed_square))) =
             (project_at(glow.open), project_at(glow.close))
         else {
             return;
         };
+        let depth = 0.5 * (opened.depth + closed.depth);
+        let sorting_depth = self.sheet.map_or(depth, |sheet| sheet.sorting_depth(0.5 * (from + to), depth));
         let is_whole = glow == view.shutter;
         let age = if is_whole { spark.age } else { (spark.age + glow.middle() - t).clamp(0.0, spark.lifetime_s) };
         let share = if is_whole { 1.0 } else { glow.duration() / view.shutter.duration() };
@@ -217,7 +246,7 @@ impl SparkEmitter<'_> {
             radius * 0.5 * (opened.pixels_per_meter + closed.pixels_per_meter),
             color::black_body().radiance(temperature as f32),
             solid_angle * share,
-            0.5 * (opened.depth + closed.depth),
+            [depth, sorting_depth],
             streaks,
         );
     }

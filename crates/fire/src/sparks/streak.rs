@@ -16,7 +16,9 @@ pub(crate) struct SparkStreak {
     /// ACEScg at full coverage, cd/m^2, such that the light of the whole streak is that of the spark.
     radiance: [f32; 3],
     /// Depth, m.
-    pub(crate) depth: f64,
+    depth: f64,
+    /// Depth at which it is sorted among flames, m.
+    pub(crate) sorting_depth: f64,
     /// Bounding box, pixels; may extend beyond the picture.
     min_pixel: [i64; 2],
     max_pixel: [i64; 2],
@@ -31,24 +33,24 @@ const MIN_RADIUS: f64 = 0.6;
 impl SparkStreak {
     /// Appends the streaks of a sphere of luminous surface that moves between two positions in the picture: several where it crosses the seam of a panorama or the
     /// antipode of a fisheye. The sum of luminance times solid angle over the pixels of each image is `radiance` times the sphere's solid angle,
-    /// steradian; both images of a fisheye share it. `radius` is in pixels.
+    /// steradian; both images of a fisheye share it. `radius` is in pixels; `depths` are the streak's own and that at which it is sorted.
     pub(crate) fn images(
         camera: &Camera,
         [from, to]: [DVec2; 2],
         radius: f64,
         radiance: [f32; 3],
         solid_angle: f64,
-        depth: f64,
+        depths: [f64; 2],
         streaks: &mut Vec<Self>,
     ) {
         let radius = radius.max(MIN_RADIUS);
         let first = streaks.len();
         if camera.lens == Lens::Perspective {
             // The only image, without a list of them.
-            streaks.extend(Self::new(from, to, radius, radiance, depth));
+            streaks.extend(Self::new(from, to, radius, radiance, depths));
         } else {
             let lines = camera.line_images(from, to, radius + EDGE_SOFTNESS).into_iter();
-            streaks.extend(lines.filter_map(|[from, to]| Self::new(from, to, radius, radiance, depth)));
+            streaks.extend(lines.filter_map(|[from, to]| Self::new(from, to, radius, radiance, depths)));
         }
         let images = &mut streaks[first..];
         let counted = if camera.lens == Lens::Fisheye { images.len() } else { images.len().min(1) };
@@ -61,7 +63,7 @@ impl SparkStreak {
         }
     }
 
-    fn new(from: DVec2, to: DVec2, radius: f64, radiance: [f32; 3], depth: f64) -> Option<Self> {
+    fn new(from: DVec2, to: DVec2, radius: f64, radiance: [f32; 3], depths: [f64; 2]) -> Option<Self> {
         /// Maximum length, pixels; a longer streak is that of a spark right in front of the lens, and is discarded.
         const MAX_LENGTH: f64 = 4000.0;
         let margin = DVec2::splat(radius + EDGE_SOFTNESS);
@@ -70,7 +72,17 @@ impl SparkStreak {
             return None;
         }
         let whole = |fraction: DVec2| [fraction.x.floor() as i64, fraction.y.floor() as i64];
-        Some(Self { from, to, radius, radiance, depth, min_pixel: whole(min_pixel), max_pixel: whole(max_pixel) })
+        let [depth, sorting_depth] = depths;
+        Some(Self {
+            from,
+            to,
+            radius,
+            radiance,
+            depth,
+            sorting_depth,
+            min_pixel: whole(min_pixel),
+            max_pixel: whole(max_pixel),
+        })
     }
 
     /// Sum over all pixels of coverage times solid angle: summed explicitly for small streaks, otherwise the area of a disc with soft edges times the
@@ -198,7 +210,7 @@ mod tests {
             ] {
                 let is_cut = lens == Lens::Perspective && from.x < 2.0;
                 let mut streaks = Vec::new();
-                SparkStreak::images(&view.camera, [from, to], radius, [3.0, 2.0, 1.0], 1e-3, 2.0, &mut streaks);
+                SparkStreak::images(&view.camera, [from, to], radius, [3.0, 2.0, 1.0], 1e-3, [2.0; 2], &mut streaks);
                 let ratio = light(&view, &streaks) / 3e-3;
                 assert!(is_cut || (ratio - 1.0).abs() < 1e-4, "{lens:?} {from} to {to}: {ratio}");
             }
@@ -211,7 +223,7 @@ mod tests {
         for (to, radius) in
             [(DVec2::new(300.0, 200.5), 3.0), (DVec2::new(20.0, 400.0), 1.5), (DVec2::new(20.0, 30.0), 80.0)]
         {
-            let streak = SparkStreak::new(DVec2::new(20.3, 20.9), to, radius, [1.0; 3], 2.0).unwrap();
+            let streak = SparkStreak::new(DVec2::new(20.3, 20.9), to, radius, [1.0; 3], [2.0; 2]).unwrap();
             let counted: f64 = streak.pixels().map(|(x, y)| streak.coverage(x, y)).sum();
             assert!((streak.covered_area() / counted - 1.0).abs() < 2e-3, "{} {counted}", streak.covered_area());
             let center = |(x, y): (i64, i64)| DVec2::new(x as f64 + 0.5, y as f64 + 0.5);

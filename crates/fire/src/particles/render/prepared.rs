@@ -103,6 +103,7 @@ fn spark_emitter<'a>(gas: &Gas, rendering: &'a GasRenderingParameters, view: &Vi
         size: gas.size,
         scale: 1.0,
         wind_response: 1.0,
+        sheet: None,
     }
 }
 
@@ -166,7 +167,7 @@ impl<'a> PreparedGas<'a> {
         };
         check(observer)?;
         let mut sparks = spark_emitter(&gas, rendering, view).streaks(view, surroundings.wind);
-        sparks.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+        sparks.sort_by(|a, b| a.sorting_depth.total_cmp(&b.sorting_depth));
         let motion = if view.aovs_requested && matches!(mode, DrawMode::SplattedGas(_) | DrawMode::Exposed(_)) {
             GasMotionField::new(&gas, rendering, &gas_view)
         } else {
@@ -418,18 +419,18 @@ impl Prepared for PreparedGas<'_> {
         };
         // The gas that refracts extends beyond the gas that emits.
         let all = self.haze_for_aovs(slice).map_or(gas, |haze| gas.union(&haze.rect));
-        let sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth));
+        let sparks = self.sparks.iter().filter(|spark| slice.contains(spark.sorting_depth));
         sparks.fold(all, |all, spark| all.union(&spark.bounds(self.view.size)))
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        let mut sparks = self.sparks.iter().filter(|spark| slice.contains(spark.depth)).peekable();
+        let mut sparks = self.sparks.iter().filter(|spark| slice.contains(spark.sorting_depth)).peekable();
         if let DrawMode::SplattedGas(splatted) = &self.mode {
             let resolver = splatted.resolver(&self.gas, self.rendering, &self.scattered);
             let mut row = resolver.row();
             let rect = splatted.grid.covered().intersection(&strip.rect);
             for layer in self.layers_in(slice) {
-                while let Some(spark) = sparks.next_if(|spark| spark.depth < layer.depth) {
+                while let Some(spark) = sparks.next_if(|spark| spark.sorting_depth < layer.depth) {
                     spark.draw(self.view, strip);
                 }
                 if rect.is_empty() {
@@ -443,7 +444,7 @@ impl Prepared for PreparedGas<'_> {
         }
         if let DrawMode::Exposed(exposed) = &self.mode {
             for layer in self.layers_in(slice) {
-                while let Some(spark) = sparks.next_if(|spark| spark.depth < layer.depth) {
+                while let Some(spark) = sparks.next_if(|spark| spark.sorting_depth < layer.depth) {
                     spark.draw(self.view, strip);
                 }
                 exposed.draw_layer(&layer, strip);

@@ -31,7 +31,7 @@ use crate::{
         model::{FlameInstance, FlameSheet},
         parameters::{SheetMethod, SheetStage},
     },
-    sparks::{SparkEmitter, SparkStreak},
+    sparks::{SheetPlane, SparkEmitter, SparkStreak},
 };
 
 /// A frame, ready to be drawn into strips.
@@ -129,7 +129,7 @@ impl FlameSheet {
         }
         for streak in self.spark_emitter(flame, view).streaks(view, surroundings.wind) {
             let rect = streak.bounds(view.size);
-            commands.push(DrawCommand { flame, depth: streak.depth, rect, item: DrawItem::Spark(streak) });
+            commands.push(DrawCommand { flame, depth: streak.sorting_depth, rect, item: DrawItem::Spark(streak) });
         }
     }
 
@@ -146,6 +146,10 @@ impl FlameSheet {
     /// Emitter of the sparks of one instance.
     fn spark_emitter(&self, flame: &FlameInstance, view: &View) -> SparkEmitter<'_> {
         let t = view.shutter.middle();
+        let base = self.base(flame, t);
+        let across = self.right(flame, &view.camera, base).cross(DVec3::Y);
+        let normal = across * (view.camera.position - base).dot(across).signum();
+        let sheet = SheetPlane { point: base, normal, depth: self.flame_depth(flame, view) };
         SparkEmitter {
             parameters: &self.parameters.sparks,
             key: flame.key,
@@ -153,10 +157,11 @@ impl FlameSheet {
             loop_s: self.clock.loop_s(),
             flow: Some(&self.parameters.flow),
             phase_s: self.parameters.phase_s + flame.placement.phase_s,
-            base: self.base(flame, t),
+            base,
             size: self.sheet_size(flame),
             scale: flame.placement.scale,
             wind_response: self.parameters.wind_response,
+            sheet: Some(sheet),
         }
     }
 
