@@ -126,8 +126,6 @@ use std::sync::Arc;
 
 pub mod effect;
 #[cfg(feature = "files")]
-pub mod farm;
-#[cfg(feature = "files")]
 pub mod job;
 mod kinds;
 mod scene_builder;

@@ -2,10 +2,8 @@
 
 use std::process::ExitCode;
 
-use bansho::{
-    farm::FarmError,
-    job::{ErrorCategory, JobError},
-};
+use bansho::job::{ErrorCategory, JobError};
+use bansho_farm::FarmError;
 
 use crate::{
     flags, interrupt,
@@ -41,19 +39,23 @@ pub(crate) enum ReportedError {
 
 /// The exit code of an error.
 pub(crate) fn code(error: &anyhow::Error) -> u8 {
-    let job = match error.downcast_ref::<ReportedError>() {
-        Some(ReportedError::Job(job)) => Some(job),
-        _ => error.downcast_ref::<JobError>(),
-    };
-    let farm = || error.downcast_ref().map(FarmError::category);
-    let plot = || error.downcast_ref().map(PlotError::category);
-    match job.map(JobError::category).or_else(farm).or_else(plot) {
+    match category(error) {
         Some(ErrorCategory::Usage) => USAGE,
         Some(ErrorCategory::Scene) => SCENE,
         Some(ErrorCategory::Cancelled) => interrupt::exit_code(),
         None if error.is::<UsageError>() => USAGE,
         Some(ErrorCategory::Work) | None => FAILED,
     }
+}
+
+/// What an error of a job, a farm or a figure is about; `None` for other errors.
+fn category(error: &anyhow::Error) -> Option<ErrorCategory> {
+    if let Some(ReportedError::Job(job)) = error.downcast_ref() {
+        return Some(job.category());
+    }
+    let job = error.downcast_ref().map(JobError::category);
+    let farm = error.downcast_ref().map(FarmError::category);
+    job.or(farm).or(error.downcast_ref().map(PlotError::category))
 }
 
 /// The message of an error with those of its causes, each once: many messages contain that of their cause.

@@ -33,14 +33,18 @@ pub(crate) fn error_message(error: &JobError) -> String {
 
 /// A hint which option may solve the problems of a scene.
 pub(crate) fn hint_for_scene(error: &SceneError) -> Option<&'static str> {
-    let needs_memory = |problem: &Problem| match asset_problem(&problem.kind) {
+    let hint = "--max-asset-memory raises the limit for the files of a scene";
+    error.problems.iter().any(needs_memory).then_some(hint)
+}
+
+/// Whether a file is refused because of the limit of `--max-asset-memory`.
+fn needs_memory(problem: &Problem) -> bool {
+    match asset_problem(&problem.kind) {
         Some(AssetProblem::Memory { .. }) => true,
         // Text files have a fixed limit.
         Some(AssetProblem::FileSize { limit, .. }) => *limit > TEXT_BYTES,
         _ => false,
-    };
-    let hint = "--max-asset-memory raises the limit for the files of a scene";
-    error.problems.iter().any(needs_memory).then_some(hint)
+    }
 }
 
 /// The problem with an asset, if that is the cause.

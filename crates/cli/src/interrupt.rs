@@ -65,14 +65,14 @@ fn watch() {
         thread::sleep(GRACE_PERIOD);
     }
     let (done, wait) = mpsc::channel();
-    // Both may block: on a disk that does not respond, on a pipe that nobody reads.
-    let clean_up = move || {
+    // On another thread: both may block, on a disk that does not respond, on a pipe that nobody reads.
+    let cleanup = thread::Builder::new().spawn(move || {
         atomic::abandon_all();
         print_message.iter().for_each(|print_message| print_message());
         // Fails only after the timeout.
         let _ = done.send(());
-    };
-    if thread::Builder::new().spawn(clean_up).is_ok() {
+    });
+    if cleanup.is_ok() {
         let _ = wait.recv_timeout(CLEANUP_TIMEOUT);
     }
     low_level::exit(i32::from(exit_code()));

@@ -60,9 +60,9 @@ pub(crate) fn shell_word(path: &Path) -> String {
     let shown = path.display().to_string();
     // Otherwise it would be an option.
     let shown = if shown.starts_with('-') { format!("./{shown}") } else { shown };
-    let is_plain = |letter: char| letter.is_alphanumeric() || "._-/+,:@=".contains(letter);
     let word = printable::printable(&shown);
-    if !word.is_empty() && word.chars().all(is_plain) {
+    // Letters that no shell takes for anything else.
+    if !word.is_empty() && word.chars().all(|letter| letter.is_alphanumeric() || "._-/+,:@=".contains(letter)) {
         return word.into_owned();
     }
     format!("'{}'", word.replace('\'', r"'\''"))

@@ -27,8 +27,12 @@ pub(super) fn multiply(a: Rgba, b: Rgba) -> Rgba {
 pub(super) fn blend_over(below: u32, color: Rgba) -> u32 {
     let [_, red, green, blue] = below.to_be_bytes();
     let through = 255 - u32::from(color[3]);
-    let channel = |c: usize, below: u8| (u32::from(color[c]) + div_255(u32::from(below) * through)).min(255) as u8;
-    u32::from_be_bytes([0, channel(0, red), channel(1, green), channel(2, blue)])
+    let mut blended = [0; 4];
+    for (blended, (color, below)) in blended[1..].iter_mut().zip(color.into_iter().zip([red, green, blue])) {
+        // Colors that are brighter than their alpha, which egui uses to add light, may exceed the range.
+        *blended = (u32::from(color) + div_255(u32::from(below) * through)).min(255) as u8;
+    }
+    u32::from_be_bytes(blended)
 }
 
 /// `texel` x `tint` over the pixel `below`.
@@ -37,20 +41,25 @@ pub(super) fn blend_tinted_over(below: u32, texel: Rgba, tint: Rgba) -> u32 {
     const WHOLE: u32 = 65025;
     let [_, red, green, blue] = below.to_be_bytes();
     let through = WHOLE - u32::from(texel[3]) * u32::from(tint[3]);
-    let channel = |c: usize, below: u8| {
+    let mut blended = [0; 4];
+    for (c, below) in [red, green, blue].into_iter().enumerate() {
+        // Rounded once, at the end, as a shader does.
         let sum = u32::from(texel[c]) * u32::from(tint[c]) * 255 + u32::from(below) * through;
-        ((sum + WHOLE / 2) / WHOLE).min(255) as u8
-    };
-    u32::from_be_bytes([0, channel(0, red), channel(1, green), channel(2, blue)])
+        blended[c + 1] = ((sum + WHOLE / 2) / WHOLE).min(255) as u8;
+    }
+    u32::from_be_bytes(blended)
 }
 
 /// The same for a floating-point color, each channel 0 to 255.
 pub(super) fn blend_over_f32(below: u32, color: [f32; 4]) -> u32 {
     let [_, red, green, blue] = below.to_be_bytes();
     let through = 1.0 - color[3] / 255.0;
-    // Casts saturate: values that rounding put outside of 0 to 255 are clamped.
-    let channel = |c: usize, below: u8| (color[c] + f32::from(below) * through + 0.5) as u8;
-    u32::from_be_bytes([0, channel(0, red), channel(1, green), channel(2, blue)])
+    let mut blended = [0; 4];
+    for (c, below) in [red, green, blue].into_iter().enumerate() {
+        // Casts saturate: values that rounding put outside of 0 to 255 are clamped.
+        blended[c + 1] = (color[c] + f32::from(below) * through + 0.5) as u8;
+    }
+    u32::from_be_bytes(blended)
 }
 
 #[cfg(test)]

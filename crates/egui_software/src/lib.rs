@@ -10,7 +10,6 @@
 //!
 //! A software Vulkan driver such as lavapipe would repaint the whole window for every frame.
 
-mod app;
 mod blend;
 mod pixel_rect;
 mod primitives;
@@ -25,11 +24,11 @@ pub mod window;
 
 use egui::{ClippedPrimitive, TexturesDelta, epaint::Primitive};
 
-pub use app::App;
 pub use pixel_rect::PixelRect;
 use primitives::{DrawPrimitive, FramebufferSize};
 use textures::Textures;
 use tiles::FramebufferTiles;
+pub use window::App;
 
 /// Rasterizes egui's meshes into a retained framebuffer: only what changed since the previous frame is painted.
 pub struct Painter {

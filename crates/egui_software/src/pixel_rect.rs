@@ -24,8 +24,7 @@ impl PixelRect {
 
     /// The pixels whose centers lie in the half-open box from `low` to `high`, subpixels.
     pub(super) fn covering(low: [i32; 2], high: [i32; 2]) -> Self {
-        let first = |at: i32| (at - SUBPIXELS / 2 + SUBPIXELS - 1).div_euclid(SUBPIXELS);
-        let ([left, top], [right, bottom]) = (low.map(first), high.map(first));
+        let ([left, top], [right, bottom]) = (low.map(first_pixel), high.map(first_pixel));
         Self { left, top, right, bottom }
     }
 
@@ -41,7 +40,16 @@ impl PixelRect {
 
     /// The rectangle as words for a hash.
     pub(super) fn hash_words(self) -> [u64; 2] {
-        let pair = |a: i32, b: i32| u64::from(a as u32) << 32 | u64::from(b as u32);
-        [pair(self.left, self.top), pair(self.right, self.bottom)]
+        [packed(self.left as u32, self.top as u32), packed(self.right as u32, self.bottom as u32)]
     }
+}
+
+/// The first pixel whose center is not before `subpixels`.
+fn first_pixel(subpixels: i32) -> i32 {
+    (subpixels - SUBPIXELS / 2 + SUBPIXELS - 1).div_euclid(SUBPIXELS)
+}
+
+/// Two words as one, for a hash.
+pub(super) fn packed(high: u32, low: u32) -> u64 {
+    u64::from(high) << 32 | u64::from(low)
 }

@@ -7,7 +7,7 @@ use egui::{
 
 use super::{
     blend::{Rgba, multiply},
-    pixel_rect::{PixelRect, SUBPIXELS},
+    pixel_rect::{PixelRect, SUBPIXELS, packed},
     textures::{Texture, Textures},
     triangle::{Corner, Triangle},
 };
@@ -90,14 +90,15 @@ impl FramebufferSize {
 
     /// The clip rectangle rounded to pixels, as egui's wgpu and glow painters round it.
     fn clip(&self, clip: Rect) -> PixelRect {
-        // Casts saturate.
-        let pixel = |at: f32, side: i32| ((at * self.pixels_per_point).round() as i32).clamp(0, side);
         let [width, height] = self.size;
+        // Casts saturate.
+        let [left, right] = [clip.min.x, clip.max.x].map(|at| (at * self.pixels_per_point).round() as i32);
+        let [top, bottom] = [clip.min.y, clip.max.y].map(|at| (at * self.pixels_per_point).round() as i32);
         PixelRect {
-            left: pixel(clip.min.x, width),
-            top: pixel(clip.min.y, height),
-            right: pixel(clip.max.x, width),
-            bottom: pixel(clip.max.y, height),
+            left: left.clamp(0, width),
+            top: top.clamp(0, height),
+            right: right.clamp(0, width),
+            bottom: bottom.clamp(0, height),
         }
     }
 
@@ -156,8 +157,10 @@ fn rectangle(first: &[Corner; 3], second: &[Corner; 3]) -> Option<[Corner; 2]> {
         }
     }
     let [lacks, other_lacks] = masks.map(|mask| !mask & 15);
-    let opposite = |mask: u8| 1 << (3 - mask.trailing_zeros());
-    let is_rectangle = lacks.count_ones() == 1 && other_lacks.count_ones() == 1 && opposite(lacks) == other_lacks;
+    // Each triangle lacks one corner, and these are opposite: bits 0 and 3, or 1 and 2.
+    let is_rectangle = lacks.count_ones() == 1
+        && other_lacks.count_ones() == 1
+        && lacks.trailing_zeros() + other_lacks.trailing_zeros() == 3;
     is_rectangle.then_some([low, high])
 }
 
@@ -250,9 +253,9 @@ fn hash_vertices<'a>(id: TextureId, corners: impl IntoIterator<Item = &'a Corner
         TextureId::User(number) => mix_hash(2, [number]),
     };
     for corner in corners {
-        let pair = |[a, b]: [u32; 2]| u64::from(a) << 32 | u64::from(b);
+        let ([x, y], [u, v]) = (corner.at.map(|at| at as u32), corner.texel.map(f32::to_bits));
         let color = u64::from(u32::from_le_bytes(corner.color));
-        hash = mix_hash(hash, [pair(corner.at.map(|at| at as u32)), pair(corner.texel.map(f32::to_bits)), color]);
+        hash = mix_hash(hash, [packed(x, y), packed(u, v), color]);
     }
     hash
 }

@@ -64,13 +64,11 @@ impl TilePixels<'_> {
 
     fn texels(&mut self, area: PixelRect, texture: &Texture, origin: [i64; 2], tint: Rgba) {
         let width = area.right - area.left;
-        // Clamped, so that the sums below cannot overflow. Texels outside of the texture are wrapped.
-        let texel = |pixel: i32, axis: usize| (i64::from(pixel) + origin[axis]).clamp(-1 << 30, 1 << 30) as i32;
-        let first = texel(area.left, 0);
+        let first = texel_of(area.left, origin[0]);
         let within = first >= 0 && (first + width) as usize <= texture.size()[0];
         let plain = tint == WHITE && texture.is_opaque();
         for y in area.top..area.bottom {
-            let from = texture.row(texture.wrap(texel(y, 1), 1));
+            let from = texture.row(texture.wrap(texel_of(y, origin[1]), 1));
             let row = self.row(y, area.left, area.right);
             if within {
                 let from = &from[first as usize..][..row.len()];
@@ -122,13 +120,13 @@ impl TilePixels<'_> {
             let colors = colors.map(|plane| plane.row(from, y));
             let coordinates = coordinates.map(|plane| plane.row(from, y));
             for (x, pixel) in self.row(y, from, to).iter_mut().enumerate() {
-                let at = |[start, step]: [f32; 2]| start + x as f32 * step;
+                let x = x as f32;
                 let texel = match triangle.color {
                     TriangleColoring::Plain(texel) | TriangleColoring::Blended(texel) => texel.map(f32::from),
-                    TriangleColoring::Textured => texture.at(coordinates.map(at)),
+                    TriangleColoring::Textured => texture.at(coordinates.map(|[start, step]| start + x * step)),
                 };
                 // Rounding errors may exceed the range.
-                let color = colors.map(|channel| at(channel).clamp(0.0, 255.0));
+                let color = colors.map(|[start, step]| (start + x * step).clamp(0.0, 255.0));
                 *pixel = blend_over_f32(*pixel, tinted(texel, color));
             }
         }
@@ -190,4 +188,10 @@ fn copy_bilinear_row(pixels: &mut [u32], columns: &[FilterTaps; TILE_WIDTH], row
         let color = texture.bilinear(*column, rows).map(|channel| (channel + 0.5) as u8);
         *pixel = pack_xrgb(color);
     }
+}
+
+/// The texel of a pixel along one axis, where pixel 0 has the texel `origin`. It is clamped, so that sums of texels and pixels cannot overflow; texels outside
+/// of the texture are wrapped.
+fn texel_of(pixel: i32, origin: i64) -> i32 {
+    (i64::from(pixel) + origin).clamp(-1 << 30, 1 << 30) as i32
 }

@@ -71,12 +71,12 @@ impl WindowSurface {
     }
 }
 
+/// A rectangle that has changed, as the window system takes it; `None` for one without pixels.
 fn damage(area: &PixelRect) -> Option<Rect> {
-    let side = |from: i32, to: i32| NonZeroU32::new(u32::try_from(to - from).ok()?);
     Some(Rect {
         x: u32::try_from(area.left).ok()?,
         y: u32::try_from(area.top).ok()?,
-        width: side(area.left, area.right)?,
-        height: side(area.top, area.bottom)?,
+        width: NonZeroU32::new(u32::try_from(area.right - area.left).ok()?)?,
+        height: NonZeroU32::new(u32::try_from(area.bottom - area.top).ok()?)?,
     })
 }

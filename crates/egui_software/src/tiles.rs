@@ -136,14 +136,15 @@ impl FramebufferTiles {
 
 impl Tile {
     fn paint(&mut self, primitives: &[DrawPrimitive], textures: &Textures) {
-        let primitive = |number: &u32| &primitives[*number as usize];
-        let occluder = self.primitives.iter().rposition(|number| occludes(primitive(number), self.area, textures));
+        // What lies below the topmost primitive that hides the whole tile need not be painted.
+        let mut numbers = self.primitives.iter();
+        let occluder = numbers.rposition(|number| occludes(&primitives[*number as usize], self.area, textures));
         let mut pixels = TilePixels { area: self.area, rows: &mut self.pixels };
         if occluder.is_none() {
             pixels.clear();
         }
         for number in &self.primitives[occluder.unwrap_or(0)..] {
-            pixels.paint(primitive(number), textures);
+            pixels.paint(&primitives[*number as usize], textures);
         }
         (self.painted_hash, self.stale) = (Some(self.pending_hash), false);
     }
@@ -163,8 +164,7 @@ fn has_changed(primitive: &DrawPrimitive, area: PixelRect, textures: &Textures) 
     match primitive.shape {
         PrimitiveShape::Fill(_) => false,
         PrimitiveShape::Texels { origin, .. } => {
-            let texel = |end: [i32; 2], axis: usize| (i64::from(end[axis]) + origin[axis]) as f32;
-            texture.has_changed(ends.map(|end| [0, 1].map(|axis| texel(end, axis))), 0.0)
+            texture.has_changed(ends.map(|end| [0, 1].map(|axis| (i64::from(end[axis]) + origin[axis]) as f32)), 0.0)
         }
         // Bilinear filtering reads the neighboring texels.
         PrimitiveShape::Picture { mapping, .. } => {
@@ -185,8 +185,8 @@ fn merge_rects(areas: Vec<PixelRect>) -> Vec<PixelRect> {
     }
     let mut all: Vec<PixelRect> = Vec::new();
     for row in rows {
-        let above = |area: &&mut PixelRect| area.bottom == row.top && (area.left, area.right) == (row.left, row.right);
-        match all.iter_mut().rev().find(above) {
+        let columns = (row.left, row.right);
+        match all.iter_mut().rev().find(|area| area.bottom == row.top && (area.left, area.right) == columns) {
             Some(area) => area.bottom = row.bottom,
             None => all.push(row),
         }

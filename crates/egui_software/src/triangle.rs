@@ -22,13 +22,16 @@ pub(super) struct Corner {
 impl Corner {
     /// At `pixels`, which must not be NaN.
     pub(super) fn at(pixels: [f32; 2], texel: [f32; 2], color: Rgba) -> Self {
-        // Rounded by a cast, since `round` is a function call without SSE4.1.
-        let snapped = |at: f32| {
-            let subpixels = at.clamp(-MAX_COORDINATE, MAX_COORDINATE) * SUBPIXELS as f32;
-            (subpixels + 0.5_f32.copysign(subpixels)) as i32
-        };
         Self { at: pixels.map(snapped), texel, color }
     }
+}
+
+/// A coordinate in pixels on the grid of subpixels.
+#[inline]
+fn snapped(pixels: f32) -> i32 {
+    // Rounded by a cast, since `round` is a function call without SSE4.1.
+    let subpixels = pixels.clamp(-MAX_COORDINATE, MAX_COORDINATE) * SUBPIXELS as f32;
+    (subpixels + 0.5_f32.copysign(subpixels)) as i32
 }
 
 /// How a triangle is colored.
@@ -104,8 +107,8 @@ impl Triangle {
 
     /// Linear interpolation of a vertex attribute.
     pub(super) fn plane(&self, of: impl Fn(&Corner) -> f32) -> AttributePlane {
-        let position = |corner: &Corner| corner.at.map(|at| f64::from(at) / f64::from(SUBPIXELS));
-        let [a, b, c] = [0, 1, 2].map(|corner| position(&self.corners[corner]));
+        // From the snapped positions, which the edges have, too: otherwise the attribute would slip along thin triangles.
+        let [a, b, c] = [0, 1, 2].map(|corner| self.corners[corner].at.map(|at| f64::from(at) / f64::from(SUBPIXELS)));
         let [at_a, at_b, at_c] = [0, 1, 2].map(|corner| f64::from(of(&self.corners[corner])));
         let (first, second) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
         let area = first[0] * second[1] - first[1] * second[0];
@@ -158,8 +161,10 @@ impl TriangleCoverage {
     pub(super) fn contains_rect(&self, area: PixelRect) -> bool {
         let [x, y] = [[area.left, area.right - 1], [area.top, area.bottom - 1]].map(|ends| ends.map(i64::from));
         self.edges.iter().all(|edge| {
-            let minimum = |slope: i64, ends: [i64; 2]| (slope * ends[0]).min(slope * ends[1]);
-            minimum(edge.step_x, x) + minimum(edge.step_y, y) + edge.offset >= 0
+            // An edge function is linear, so that it is least at a corner: at one end of x and one of y.
+            let least_x = (edge.step_x * x[0]).min(edge.step_x * x[1]);
+            let least_y = (edge.step_y * y[0]).min(edge.step_y * y[1]);
+            least_x + least_y + edge.offset >= 0
         })
     }
 }

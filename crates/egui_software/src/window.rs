@@ -16,13 +16,22 @@ use winit::{
     window::{Window, WindowId},
 };
 
-use super::{Painter, app::App, surface::WindowSurface};
+use super::{Painter, surface::WindowSurface};
 
 /// Shortest time between two frames.
 const MIN_FRAME_INTERVAL: Duration = Duration::from_millis(8);
 
 /// Largest texture side that is reported to egui, texels.
 const MAX_TEXTURE_SIDE: usize = 8192;
+
+/// An application, as `eframe::App` is one, that [`run`] runs until it closes.
+pub trait App {
+    /// Builds the user interface of one frame. `wait_until_presented` blocks until the previous frame is on the screen.
+    fn ui(&mut self, ui: &mut egui::Ui, wait_until_presented: &mut dyn FnMut());
+
+    /// Called once when the window closes.
+    fn on_exit(&mut self);
+}
 
 /// Creates the application once the egui context can request repaints.
 pub type AppCreator = Box<dyn FnOnce(&egui::Context) -> Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>>;

@@ -88,7 +88,6 @@ fn allowed_names(kinds: &[TableKind]) -> String {
 
 /// Why a phenomenon cannot have this name.
 fn name_problem(name: &str, kinds: &[TableKind]) -> Option<String> {
-    let is_control_or_dot = |character: char| character == '.' || character.is_control();
     if NAMES_RESERVED_BY_READERS.contains(&name) {
         let others = NAMES_RESERVED_BY_READERS.join(", ");
         let problem = "cannot be a name, since programs that read EXR files take such a layer for the picture itself";
@@ -98,7 +97,8 @@ fn name_problem(name: &str, kinds: &[TableKind]) -> Option<String> {
         let problem = format!("is a name of {} bytes, which programs that read EXR files would truncate", name.len());
         return Some(format!("{problem}; allowed: {}", allowed_names(kinds)));
     }
-    if name.trim().is_empty() || reserved_names(kinds).contains(&name) || name.contains(is_control_or_dot) {
+    let has_control_or_dot = name.contains(|character: char| character == '.' || character.is_control());
+    if name.trim().is_empty() || reserved_names(kinds).contains(&name) || has_control_or_dot {
         let problem = "cannot be a name, since the names of EXR channels begin with it";
         return Some(format!("{problem}; allowed: {}", allowed_names(kinds)));
     }
@@ -128,12 +128,16 @@ fn camera(scene: &Scene, root: &Table, reader: &mut Reader) {
         let span = nearest_span(root, "camera.target");
         reader.within("camera", |r| r.within("target", |r| r.report_at(span, kind)));
     }
-    let has_up = |up: &[f64; 3]| DVec3::from(*up).try_normalize().is_some();
-    if !scene.camera.up.values().iter().all(has_up) {
+    if scene.camera.up.values().iter().any(|up| DVec3::from(*up).try_normalize().is_none()) {
         let kind = ProblemKind::Conflict("is no direction; allowed: any three numbers that are not all 0".into());
         report_build_error(BuildError { key: "up".into(), kind }, "camera".into(), root, reader);
     }
     field_of_view(scene, root, reader);
+}
+
+/// The focal length of a rectilinear lens that shows a vertical field of view on a sensor of this height, mm.
+fn focal_length_mm(vertical_fov_deg: f64, sensor_height_mm: f64) -> f64 {
+    0.5 * sensor_height_mm / math::tan(0.5 * vertical_fov_deg.to_radians())
 }
 
 /// The field of view of a focal length and a sensor has the same limits as one that is stated.
@@ -144,14 +148,13 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
     }
     let Some([narrowest, widest]) = camera.fov_of_focal_length() else { return };
     // The limits themselves are allowed, with a tolerance for rounding.
-    let is_allowed = |fov: f64| (min * (1.0 - 1e-9)..=max * (1.0 + 1e-9)).contains(&fov);
-    let Some(fov) = [widest, narrowest].into_iter().find(|fov| !is_allowed(*fov)) else { return };
+    let allowed = min * (1.0 - 1e-9)..=max * (1.0 + 1e-9);
+    let Some(fov) = [widest, narrowest].into_iter().find(|fov| !allowed.contains(fov)) else { return };
     let sensor = camera.sensor_height_mm;
-    let focal = |fov: f64| 0.5 * sensor / math::tan(0.5 * fov.to_radians());
     let reason = format!(
         "gives a field of view of {fov:.3} degrees with a sensor of {sensor} mm; allowed: {min} to {max} degrees, here {:.3} to {:.0} mm",
-        focal(max),
-        focal(min)
+        focal_length_mm(max, sensor),
+        focal_length_mm(min, sensor)
     );
     report_build_error(
         BuildError { key: "focal_length_mm".into(), kind: ProblemKind::Conflict(reason) },

@@ -183,22 +183,27 @@ impl Scene {
     /// # Errors
     /// All problems of the text, each with its position, what is wrong and what is allowed.
     pub fn parse(file: &str, text: &str, kinds: &[TableKind]) -> Result<Self, SceneError> {
-        let fail = |Problems { listed, omitted }| SceneError {
+        let parsed = Self::parse_text(text, kinds);
+        parsed.map_err(|Problems { listed, omitted }| SceneError {
             file: file.to_owned(),
             text: text.to_owned(),
             problems: listed,
             omitted,
-        };
-        let root = toml::parse(text).map_err(|problem| fail(Problems { listed: vec![problem], omitted: 0 }))?;
+        })
+    }
+
+    fn parse_text(text: &str, kinds: &[TableKind]) -> Result<Self, Problems> {
+        let root = toml::parse(text).map_err(|problem| Problems { listed: vec![problem], omitted: 0 })?;
         let mut reader = Reader::new();
         if !check::format(&root, &mut reader) {
-            return Err(fail(reader.into_problems()));
+            return Err(reader.into_problems());
         }
         let scene = Self::read(&root, kinds, &mut reader);
+        // A check of values that could not be read would report them twice.
         if reader.is_clean() {
             check::values(&scene, &root, &mut reader);
         }
-        if reader.is_clean() { Ok(scene) } else { Err(fail(reader.into_problems())) }
+        if reader.is_clean() { Ok(scene) } else { Err(reader.into_problems()) }
     }
 
     /// Reads and checks a scene whose tables a program has made. No text is printed or parsed.
@@ -311,27 +316,24 @@ impl Scene {
             instances: read_instances(root, kinds, reader),
             implied,
         };
-        let white_of_light = || scene.tables.iter().find_map(|table| table.parameters.white_balance_k());
-        scene.picture.white_balance_k = scene.picture.white_balance_k.or_else(white_of_light);
+        if scene.picture.white_balance_k.is_none() {
+            scene.picture.white_balance_k = scene.tables.iter().find_map(|table| table.parameters.white_balance_k());
+        }
         scene
     }
 
     /// Points a camera without position and target at the sky if all phenomena are in the sky.
     fn with_camera_toward_sky(mut self, root: &Table) -> Self {
-        let states = |key: &str| match root.get("camera").map(|node| &node.value) {
-            Some(Value::Table(camera)) => camera.get(key).is_some(),
-            _ => false,
-        };
         let all_in_the_sky =
             !self.instances.is_empty() && self.instances.iter().all(|instance| instance.kind.in_the_sky);
         if all_in_the_sky
             && !self.tables.iter().any(determines_view)
             && !self.has_plate()
-            && !states("position")
-            && !states("target")
+            && !states_in(root, "camera", "position")
+            && !states_in(root, "camera", "target")
         {
             self.camera.look_up();
-            if !states("vertical_fov_deg") {
+            if !states_in(root, "camera", "vertical_fov_deg") {
                 self.camera.vertical_fov_deg = Animated::from(SKY_FOV_DEG);
             }
         }
@@ -351,13 +353,21 @@ impl Scene {
 
     /// Whether a sky, a ground or another table that fills the background is visible, and stated by the text.
     pub fn shows_stated_backdrop(&self) -> bool {
-        let is_stated = |table: &SharedInstance| !self.implied.contains(&table.kind.key);
-        self.tables.iter().any(|table| table.parameters.fills_background() && is_stated(table))
+        let mut stated = self.tables.iter().filter(|table| !self.implied.contains(&table.kind.key));
+        stated.any(|table| table.parameters.fills_background())
     }
 
     /// Whether the phenomena are composited over a plate.
     pub fn has_plate(&self) -> bool {
         self.plate.image.is_some()
+    }
+}
+
+/// Whether the scene `root` states `key` of one of its tables.
+fn states_in(root: &Table, table: &str, key: &str) -> bool {
+    match root.get(table).map(|node| &node.value) {
+        Some(Value::Table(table)) => table.get(key).is_some(),
+        _ => false,
     }
 }
 
@@ -409,8 +419,9 @@ fn check_instance_memory(root: &Table, kinds: &[TableKind], reader: &mut Reader)
         if memory::can_allocate(bytes) {
             continue;
         }
-        let fits = |count: i64| memory::can_allocate(others + count as f64 * kind.built_bytes);
-        let most = memory::largest_fitting_count(count as i64, fits);
+        let most = memory::largest_fitting_count(count as i64, |count| {
+            memory::can_allocate(others + count as f64 * kind.built_bytes)
+        });
         let required = memory::format_bytes(bytes as u64);
         let message = format!("{count} tables [[{}]] would take {required}; allowed: up to {most}", kind.key);
         reader.report_at(Some(entry.key_span.clone()), ProblemKind::Conflict(message));

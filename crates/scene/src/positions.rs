@@ -8,7 +8,7 @@ use bansho_base::{
 };
 
 use crate::{
-    Instance, LineColumn, Scene,
+    LineColumn, Scene,
     tables::kinds::PLATE_LAYER,
     text::{lines::Lines, path::nearest_span, toml},
 };
@@ -27,12 +27,13 @@ impl<'t> Positions<'t> {
     #[must_use]
     pub fn new(scene: &Scene, text: &'t str) -> Self {
         let mut counts: HashMap<&str, usize> = HashMap::new();
-        let path = |instance: &Instance| {
+        let mut paths = HashMap::new();
+        for instance in &scene.instances {
+            // The number of instances of this kind so far is the index of the next one.
             let index = counts.entry(instance.kind.key).or_default();
+            paths.insert(instance.name.clone(), format!("{}.{index}", instance.kind.key));
             *index += 1;
-            (instance.name.clone(), format!("{}.{}", instance.kind.key, *index - 1))
-        };
-        let paths = scene.instances.iter().map(path).collect();
+        }
         Self { root: toml::parse(text).ok(), kinds: scene.kinds.clone(), lines: Lines::new(text), paths }
     }
 

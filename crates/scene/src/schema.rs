@@ -148,8 +148,8 @@ fn value(value: &Value) -> Json {
         Value::Text(text) => json!(text),
         Value::List(items) => items.iter().map(|item| self::value(&item.value)).collect(),
         Value::Table(table) => {
-            let entry = |entry: &bansho_base::parameters::Entry| (entry.key.clone(), self::value(&entry.node.value));
-            Json::Object(table.entries.iter().map(entry).collect())
+            let entries = table.entries.iter().map(|entry| (entry.key.clone(), self::value(&entry.node.value)));
+            Json::Object(entries.collect())
         }
     }
 }

@@ -94,8 +94,9 @@ fn lines(prefix: &str, descriptor: &TableDescriptor, stated: &Table, first: &[&s
 fn brief(parameter: &Descriptor, after: usize) -> String {
     const WIDTH: usize = 110;
     let doc = parameter.doc.split_whitespace().collect::<Vec<_>>().join(" ");
-    let is_end = |at: usize| doc[at + 2..].starts_with(|next: char| next.is_uppercase());
-    let end = doc.match_indices(". ").map(|(at, _)| at).find(|&at| is_end(at)).unwrap_or(doc.len());
+    // A period before a small letter is that of an abbreviation.
+    let mut periods = doc.match_indices(". ").map(|(at, _)| at);
+    let end = periods.find(|&at| doc[at + 2..].starts_with(char::is_uppercase)).unwrap_or(doc.len());
     let mut sentence = doc[..end].trim_end_matches('.');
     if after + sentence.len() > WIDTH {
         sentence = sentence.split([';', ':']).next().unwrap_or(sentence);
@@ -129,8 +130,11 @@ fn stated_tables<'a>(setting: &'a Table, key: &str) -> Vec<&'a Table> {
     match setting.get(key).map(|node| &node.value) {
         Some(Value::Table(table)) => vec![table],
         Some(Value::List(items)) => {
-            let table = |value: &'a Value| if let Value::Table(table) = value { Some(table) } else { None };
-            items.iter().filter_map(|item| table(&item.value)).collect()
+            let tables = items.iter().filter_map(|item| match &item.value {
+                Value::Table(table) => Some(table),
+                _ => None,
+            });
+            tables.collect()
         }
         _ => Vec::new(),
     }

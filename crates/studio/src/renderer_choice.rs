@@ -63,13 +63,16 @@ fn has_gpu() -> bool {
 fn run_with_gpu(viewport: ViewportBuilder, build: AppCreator) -> Result<(), Box<dyn std::error::Error>> {
     // Dithering would add noise to the picture.
     let options = eframe::NativeOptions { viewport, dithering: false, ..eframe::NativeOptions::default() };
-    let build = |creation: &eframe::CreationContext| {
-        let app = build(&creation.egui_ctx)?;
-        Ok(Box::new(GpuApp(app)) as Box<dyn eframe::App>)
-    };
     let title = options.viewport.title.clone().unwrap_or_default();
-    let with_hint = |error: eframe::Error| format!("{error}; `--painter software` needs no GPU");
-    Ok(eframe::run_native(&title, options, Box::new(build)).map_err(with_hint)?)
+    let ended = eframe::run_native(
+        &title,
+        options,
+        Box::new(|creation| {
+            let app = build(&creation.egui_ctx)?;
+            Ok(Box::new(GpuApp(app)))
+        }),
+    );
+    Ok(ended.map_err(|error| format!("{error}; `--painter software` needs no GPU"))?)
 }
 
 /// The error, and what to do where there is no display.
@@ -88,13 +91,12 @@ struct GpuApp(Box<dyn App>);
 
 impl eframe::App for GpuApp {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
-        let mut wait_until_presented = || {
+        self.0.ui(ui, &mut || {
             if let Some(state) = frame.wgpu_render_state() {
                 // A lost device is reported at its next use.
                 let _ = state.device.poll(PollType::wait_indefinitely());
             }
-        };
-        self.0.ui(ui, &mut wait_until_presented);
+        });
     }
 
     fn on_exit(&mut self) {

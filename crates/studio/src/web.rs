@@ -29,14 +29,14 @@ async fn start() -> Result<(), JsValue> {
     let canvas: HtmlCanvasElement = canvas.dyn_into()?;
     prevent_default_keys(&window)?;
     let named = window.location().hash()?.trim_start_matches('#').to_owned();
-    let build = move |creation: &eframe::CreationContext| {
+    let creator: eframe::AppCreator<'static> = Box::new(move |creation| {
         let ctx = creation.egui_ctx.clone();
         let session = Session::new(scene(&named), None, player(ctx), no_folder);
         let page =
             Page { studio: Studio::new(session, None), shown_notice: String::new(), unsaved: ask_before_leaving() };
-        Ok(Box::new(page) as Box<dyn eframe::App>)
-    };
-    eframe::WebRunner::new().start(canvas, eframe::WebOptions::default(), Box::new(build)).await?;
+        Ok(Box::new(page))
+    });
+    eframe::WebRunner::new().start(canvas, eframe::WebOptions::default(), creator).await?;
     show_status("");
     Ok(())
 }

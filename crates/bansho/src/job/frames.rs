@@ -95,7 +95,7 @@ fn signed(text: &str) -> Option<i64> {
 const MAX_LISTED_RANGES: usize = 100;
 
 /// `3-14, 20` for ascending numbers. After a hundred ranges, the remaining frames are counted.
-pub(crate) fn format_ranges(numbers: &[i64]) -> String {
+pub fn format_ranges(numbers: &[i64]) -> String {
     let mut runs = numbers.chunk_by(|a, b| a.checked_add(1) == Some(*b));
     let shown: Vec<String> = runs.by_ref().take(MAX_LISTED_RANGES).map(format_range).collect();
     match runs.map(<[i64]>::len).sum() {

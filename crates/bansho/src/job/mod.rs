@@ -12,9 +12,9 @@ mod flipbook;
 pub mod frames;
 mod observer;
 mod pipeline;
-pub(crate) mod render;
+mod render;
 mod scene_file;
-pub(crate) mod sheet;
+mod sheet;
 #[cfg(feature = "rain")]
 mod streaks;
 #[cfg(test)]
@@ -36,8 +36,8 @@ pub use flipbook::{Flipbook, FlipbookCrop, FlipbookSummary, PreparedFlipbook};
 pub use observer::{FilePosition, FrameDone, JobObserver, JobStarted, Warning};
 pub use render::{
     Summary,
-    contact_sheet::ContactBackground,
-    prepare::{PreparedJob, check_scene, remarks},
+    contact_sheet::{ContactBackground, compose_contact_sheet},
+    prepare::{PreparedJob, check_scene, check_view, remarks},
     resume::FrameState,
 };
 pub use scene_file::{MAX_SCENE_BYTES, SceneFile};

@@ -2,14 +2,14 @@
 
 use std::sync::{
     Arc, Mutex,
-    atomic::{AtomicBool, AtomicUsize, Ordering},
+    atomic::{AtomicBool, Ordering},
 };
 
 use bansho_base::{
     frame::Frame,
     host::{
         assets::MemoryAssets,
-        observer::{Observer, Stage, check},
+        observer::{Observer, check},
     },
     image::{Image, Rect},
     phenomenon::SnapshotError,
@@ -108,15 +108,9 @@ pub(crate) fn blank(plan: &Plan, number: i64) -> Frame {
 pub(crate) struct RecordingObserver {
     pub(crate) warnings: Mutex<Vec<Warning>>,
     pub(crate) stop: AtomicBool,
-    /// Number of stages that began.
-    pub(crate) stages: AtomicUsize,
 }
 
 impl Observer for RecordingObserver {
-    fn begin(&self, _stage: Stage) {
-        self.stages.fetch_add(1, Ordering::Relaxed);
-    }
-
     fn cancelled(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }

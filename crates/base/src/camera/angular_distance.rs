@@ -90,22 +90,19 @@ impl AngularDistance {
     /// repeats. They do not overlap.
     pub fn rects_within(&self, angle: f64, size: [usize; 2]) -> Vec<Rect> {
         let [low, high] = self.corners_within(angle);
-        let clip = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-        let (y, bottom) = (clip(low.y.floor(), size[1]), clip(high.y.ceil(), size[1]));
-        let rect = |left: f64, right: f64| {
-            let (x, right) = (clip(left.floor(), size[0]), clip(right.ceil(), size[0]));
-            (x < right && y < bottom).then(|| Rect { x, y, width: right - x, height: bottom - y })
-        };
         match self.camera.horizontal_period() {
             // Repetitions so wide that they touch are one rectangle of the whole width.
             Some(period) if high.x - low.x + 2.0 < period => {
                 let (first, last) =
                     ((-high.x / period).floor() as i64, ((size[0] as f64 - low.x) / period).ceil() as i64);
-                let shifts = (first..=last).map(|repetition| repetition as f64 * period);
-                shifts.filter_map(|shift| rect(low.x + shift, high.x + shift)).collect()
+                let shifts = (first..=last).map(|repetition| DVec2::new(repetition as f64 * period, 0.0));
+                shifts.filter_map(|shift| whole_pixels(low + shift, high + shift, size)).collect()
             }
-            Some(_) => rect(0.0, size[0] as f64).into_iter().collect(),
-            None => rect(low.x, high.x).into_iter().collect(),
+            Some(_) => {
+                let width = size[0] as f64;
+                whole_pixels(DVec2::new(0.0, low.y), DVec2::new(width, high.y), size).into_iter().collect()
+            }
+            None => whole_pixels(low, high, size).into_iter().collect(),
         }
     }
 
@@ -113,29 +110,22 @@ impl AngularDistance {
     fn corners_within(&self, angle: f64) -> [DVec2; 2] {
         let [low, high] = self.offsets_within(angle);
         let (principal, focal) = (self.camera.principal_point, self.camera.focal_pixels);
-        let corner = |x: f64, y: f64| principal + DVec2::new(x, -y) * focal;
-        [corner(low.x, high.y) - 2.0, corner(high.x, low.y) + 2.0]
+        // Offsets are upward, rows of pixels downward.
+        [principal + DVec2::new(low.x, -high.y) * focal - 2.0, principal + DVec2::new(high.x, -low.y) * focal + 2.0]
     }
 
     /// Smallest and largest offsets from the principal point, as those of `offset`, of all directions within `angle`.
     fn offsets_within(&self, angle: f64) -> [DVec2; 2] {
         use std::f64::consts::{FRAC_PI_2, PI};
         let middle = self.offset;
-        // Half of the angle between the two planes through an axis that touch the cone; `across` is the sine of the angle between axis and direction.
-        let half = |across: f64| {
-            let sine = math::sin(angle.min(FRAC_PI_2));
-            if sine < across { math::asin(sine / across) } else { PI }
-        };
         let [x, y, z] = self.direction.to_array();
         match self.camera.lens {
             Lens::Perspective => {
-                let tangents = |sideways: f64| {
-                    let (middle, half) = (math::atan2(sideways, -z), half(math::hypot(sideways, z)));
-                    let tangent = |angle: f64| if angle.abs() < FRAC_PI_2 { math::tan(angle) } else { f64::INFINITY };
-                    let (low, high) = (middle - half, middle + half);
-                    [if low > -FRAC_PI_2 { tangent(low) } else { -f64::INFINITY }, tangent(high)]
-                };
-                let ([left, right], [low, high]) = (tangents(x), tangents(y));
+                let [[left, right], [low, high]] = [x, y].map(|sideways| {
+                    let half = half_angle_of_planes(angle, math::hypot(sideways, z));
+                    let middle = math::atan2(sideways, -z);
+                    tangents([middle - half, middle + half])
+                });
                 [DVec2::new(left, low), DVec2::new(right, high)]
             }
             Lens::Fisheye => {
@@ -147,11 +137,12 @@ impl AngularDistance {
                 [(middle - reach).max(-rim), (middle + reach).min(rim)]
             }
             Lens::Panorama => {
-                let half = if middle.y.abs() + angle < FRAC_PI_2 { half(math::hypot(x, z)).min(PI) } else { PI };
-                let latitude = |latitude: f64| latitude.clamp(-FRAC_PI_2, FRAC_PI_2);
+                // A cap around a pole has all longitudes.
+                let has_pole = middle.y.abs() + angle >= FRAC_PI_2;
+                let half = if has_pole { PI } else { half_angle_of_planes(angle, math::hypot(x, z)).min(PI) };
                 [
-                    DVec2::new(middle.x - half, latitude(middle.y - angle)),
-                    DVec2::new(middle.x + half, latitude(middle.y + angle)),
+                    DVec2::new(middle.x - half, (middle.y - angle).clamp(-FRAC_PI_2, FRAC_PI_2)),
+                    DVec2::new(middle.x + half, (middle.y + angle).clamp(-FRAC_PI_2, FRAC_PI_2)),
                 ]
             }
         }
@@ -267,8 +258,8 @@ fn direction_and_derivatives(lens: Lens, x: f64, y: f64) -> [DVec3; 3] {
         Lens::Perspective => {
             let per_length = 1.0 / math::sqrt(1.0 + x * x + y * y);
             let seen = DVec3::new(x, y, -1.0) * per_length;
-            let along = |axis: DVec3, cosine: f64| (axis - seen * cosine) * per_length;
-            [seen, along(DVec3::X, seen.x), along(DVec3::Y, seen.y)]
+            // The derivative of v / |v|: the part of the axis that is perpendicular to `seen`, over |v|.
+            [seen, (DVec3::X - seen * seen.x) * per_length, (DVec3::Y - seen * seen.y) * per_length]
         }
         Lens::Fisheye => {
             let angle = math::hypot(x, y);
@@ -291,6 +282,37 @@ fn direction_and_derivatives(lens: Lens, x: f64, y: f64) -> [DVec3; 3] {
             ]
         }
     }
+}
+
+/// The pixels of a picture of `size` that a rectangle touches; `None` where it touches none.
+fn whole_pixels(low: DVec2, high: DVec2, size: [usize; 2]) -> Option<Rect> {
+    let last = DVec2::new(size[0] as f64, size[1] as f64);
+    let low = low.floor().clamp(DVec2::ZERO, last);
+    let high = high.ceil().clamp(DVec2::ZERO, last);
+    let ([x, y], [right, bottom]) = (low.to_array().map(|at| at as usize), high.to_array().map(|at| at as usize));
+    (x < right && y < bottom).then(|| Rect { x, y, width: right - x, height: bottom - y })
+}
+
+/// Half of the angle between the two planes through an axis that touch a cone of this half angle; `across` is the sine of the angle between the axis and the
+/// cone's direction. It is pi where the axis is inside of the cone.
+fn half_angle_of_planes(angle: f64, across: f64) -> f64 {
+    let sine = math::sin(angle.min(std::f64::consts::FRAC_PI_2));
+    if sine < across { math::asin(sine / across) } else { std::f64::consts::PI }
+}
+
+/// Tangents of a range of angles from the optical axis, in a plane; infinite where the range reaches beyond what a perspective lens sees.
+fn tangents([low, high]: [f64; 2]) -> [f64; 2] {
+    let seen = -std::f64::consts::FRAC_PI_2..std::f64::consts::FRAC_PI_2;
+    [
+        if low <= seen.start {
+            f64::NEG_INFINITY
+        } else if low < seen.end {
+            math::tan(low)
+        } else {
+            f64::INFINITY
+        },
+        if high > seen.start && high < seen.end { math::tan(high) } else { f64::INFINITY },
+    ]
 }
 
 #[cfg(test)]

@@ -94,13 +94,13 @@ impl CoarseTable {
     }
 
     fn new() -> Self {
-        let node = |i: usize| {
+        // There is no node beyond the highest temperature: the cubic of the last interval uses the four last nodes instead.
+        let nodes = (0..=COARSE_INTERVALS).map(|i| {
             let temperature_k = COARSE_LOWEST_K * libm::exp(Self::ln_ratio() * i as f64);
             let [x, y, z] = xyz_of_spectrum(|nm| planck_radiance_per_nm(nm, temperature_k));
             [libm::log(y * LUMINOUS_EFFICACY_LM_PER_W), x / y, z / y]
-        };
-        // There is no node beyond the highest temperature: the cubic of the last interval uses the four last nodes instead.
-        Self((0..=COARSE_INTERVALS).map(node).collect())
+        });
+        Self(nodes.collect())
     }
 
     /// Cubic Lagrange interpolation in ln T through the four nodes around `temperature_k`.

@@ -38,9 +38,8 @@ impl DistanceField {
         let mut builder = GridBuilder::new(mesh, origin, spacing, size.to_array().map(|side| side as usize));
         builder.sweep();
         let inside = builder.classify_inside();
-        let signed = |(distance, inside): (f32, bool)| if inside { -distance } else { distance };
-        let distance =
-            builder.distance.iter().zip(inside).map(|(d, inside)| signed((*d * spacing as f32, inside))).collect();
+        let distances = builder.distance.iter().map(|cells| cells * spacing as f32);
+        let distance = distances.zip(inside).map(|(meters, inside)| if inside { -meters } else { meters }).collect();
         Self { origin, spacing, size: builder.size, distance }
     }
 
@@ -53,10 +52,15 @@ impl DistanceField {
         let cell = clamped.floor().min(last - 1.0);
         let f = clamped - cell;
         let [x, y, z] = cell.to_array().map(|c| c as usize);
-        let corner = |i: usize, j: usize, k: usize| f64::from(self.distance[self.index([x + i, y + j, z + k])]);
-        let along = |j, k| corner(0, j, k) * (1.0 - f.x) + corner(1, j, k) * f.x;
-        let across = |k| along(0, k) * (1.0 - f.y) + along(1, k) * f.y;
-        across(0) * (1.0 - f.z) + across(1) * f.z + (grid_position - clamped).length() * self.spacing
+        // First along x, then y, then z.
+        let [front, back] = [z, z + 1].map(|z| {
+            let [low, high] = [y, y + 1].map(|y| {
+                let [left, right] = [x, x + 1].map(|x| f64::from(self.distance[self.index([x, y, z])]));
+                left * (1.0 - f.x) + right * f.x
+            });
+            low * (1.0 - f.y) + high * f.y
+        });
+        front * (1.0 - f.z) + back * f.z + (grid_position - clamped).length() * self.spacing
     }
 
     /// Minimum and maximum corner of the grid, which contains the mesh.
@@ -68,8 +72,9 @@ impl DistanceField {
     /// Unit vector away from the mesh at `point`: the normalized gradient of the distance, by central differences.
     pub fn normal(&self, point: DVec3) -> DVec3 {
         let step = 0.5 * self.spacing;
-        let difference = |axis: DVec3| self.at(point + axis * step) - self.at(point - axis * step);
-        DVec3::new(difference(DVec3::X), difference(DVec3::Y), difference(DVec3::Z)).normalize_or(DVec3::Y)
+        let differences =
+            [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| self.at(point + axis * step) - self.at(point - axis * step));
+        DVec3::from(differences).normalize_or(DVec3::Y)
     }
 
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
@@ -106,9 +111,10 @@ const NONE: u32 = u32::MAX;
 
 impl GridBuilder {
     fn new(mesh: &Mesh, origin: DVec3, spacing: f64, size: [usize; 3]) -> Self {
-        let to_cells = |corner: DVec3| ((corner - origin) / spacing).as_vec3();
         let count = size.iter().product();
-        let triangles = mesh.triangles().map(|corners| corners.map(to_cells)).collect();
+        // In cells, so that one unit of distance is one cell.
+        let triangles =
+            mesh.triangles().map(|corners| corners.map(|corner| ((corner - origin) / spacing).as_vec3())).collect();
         let mut builder = Self { size, triangles, distance: vec![f32::INFINITY; count], nearest: vec![NONE; count] };
         (0..builder.triangles.len()).for_each(|triangle| builder.compute_exact_distances(triangle));
         builder
@@ -120,10 +126,10 @@ impl GridBuilder {
         let low = (a.min(b).min(c).floor() - 1.0).max(Vec3::ZERO).as_uvec3();
         let high = (a.max(b).max(c).ceil() + 1.0).max(Vec3::ZERO).as_uvec3();
         let size = self.size;
-        let end = |axis: usize| (high[axis] as usize + 1).min(size[axis]);
-        for z in low.z as usize..end(2) {
-            for y in low.y as usize..end(1) {
-                for x in low.x as usize..end(0) {
+        let [end_x, end_y, end_z] = [0, 1, 2].map(|axis| (high[axis] as usize + 1).min(size[axis]));
+        for z in low.z as usize..end_z {
+            for y in low.y as usize..end_y {
+                for x in low.x as usize..end_x {
                     self.update_distance([x, y, z], triangle as u32);
                 }
             }
@@ -144,12 +150,15 @@ impl GridBuilder {
     fn sweep(&mut self) {
         let [width, height, depth] = self.size;
         for diagonal in 0..16 {
-            let forward = |bit: usize, i: usize, side: usize| if diagonal >> bit & 1 == 0 { i } else { side - 1 - i };
+            // Each bit says whether the sweep goes backward along an axis.
+            let is_backward = [0, 1, 2].map(|bit| diagonal >> bit & 1 == 1);
             for k in 0..depth {
                 for j in 0..height {
                     for i in 0..width {
-                        let grid_point = [forward(0, i, width), forward(1, j, height), forward(2, k, depth)];
-                        self.propagate_from_neighbors(grid_point, diagonal);
+                        let x = if is_backward[0] { width - 1 - i } else { i };
+                        let y = if is_backward[1] { height - 1 - j } else { j };
+                        let z = if is_backward[2] { depth - 1 - k } else { k };
+                        self.propagate_from_neighbors([x, y, z], diagonal);
                     }
                 }
             }
@@ -206,20 +215,13 @@ fn find_crossings(corners: &[Vec3; 3], [axis, u, v]: [usize; 3], size: [usize; 2
     // The lines are shifted slightly, so that they do not pass through vertices and edges of meshes with round coordinates.
     let shift = [1.371e-4, 2.137e-4];
     let projected = corners.map(|corner| [corner[u] - shift[0], corner[v] - shift[1]]);
-    let cross = |[ax, ay]: [f32; 2], [bx, by]: [f32; 2], [px, py]: [f32; 2]| {
-        f64::from(bx - ax) * f64::from(py - ay) - f64::from(by - ay) * f64::from(px - ax)
-    };
-    let area = cross(projected[0], projected[1], projected[2]);
-    let range = |k: usize| {
-        let (low, high) = (projected.map(|c| c[k]), projected.map(|c| c[k]));
-        let low = low.into_iter().fold(f32::INFINITY, f32::min).ceil().max(0.0) as usize;
-        let high = high.into_iter().fold(f32::NEG_INFINITY, f32::max).floor();
-        if high < 0.0 { low..low } else { low..(high as usize + 1).min(size[k]) }
-    };
-    for j in range(1) {
-        for i in range(0) {
+    let area = twice_area(projected[0], projected[1], projected[2]);
+    let [columns, rows] = [0, 1].map(|k| grid_lines_within(projected.map(|corner| corner[k]), size[k]));
+    for j in rows {
+        for i in columns.clone() {
             let point = [i as f32, j as f32];
-            let weights = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| cross(projected[a], projected[b], point) / area);
+            // Barycentric coordinates.
+            let weights = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| twice_area(projected[a], projected[b], point) / area);
             if area != 0.0 && weights.iter().all(|weight| *weight >= 0.0) {
                 let at: f64 = (0..3).map(|k| weights[k] * f64::from(corners[k][axis])).sum();
                 crossings[j * size[0] + i].push(at as f32);
@@ -228,20 +230,35 @@ fn find_crossings(corners: &[Vec3; 3], [axis, u, v]: [usize; 3], size: [usize; 2
     }
 }
 
+/// Twice the area of a triangle; positive where its corners go counterclockwise.
+fn twice_area([ax, ay]: [f32; 2], [bx, by]: [f32; 2], [px, py]: [f32; 2]) -> f64 {
+    f64::from(bx - ax) * f64::from(py - ay) - f64::from(by - ay) * f64::from(px - ax)
+}
+
+/// The numbers of the lines of a grid, of which there are `count`, between the least and the greatest of `corners`.
+fn grid_lines_within(corners: [f32; 3], count: usize) -> std::ops::Range<usize> {
+    let low = corners.into_iter().fold(f32::INFINITY, f32::min).ceil().max(0.0) as usize;
+    let high = corners.into_iter().fold(f32::NEG_INFINITY, f32::max).floor();
+    if high < 0.0 { low..low } else { low..(high as usize + 1).min(count) }
+}
+
 /// Distance from a point to a triangle (Ericson, "Real-time collision detection", 5.1.5).
 fn distance_to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
     let (ab, ac, bc) = (b - a, c - a, c - b);
     let normal = ab.cross(ac);
-    let outside = |edge: Vec3, corner: Vec3| edge.cross(p - corner).dot(normal) < 0.0;
-    let to_edge = |edge: Vec3, corner: Vec3| {
-        let along = ((p - corner).dot(edge) / edge.length_squared().max(1e-30)).clamp(0.0, 1.0);
-        (p - corner - edge * along).length()
-    };
-    if outside(ab, a) || outside(bc, b) || outside(-ac, c) {
-        to_edge(ab, a).min(to_edge(bc, b)).min(to_edge(ac, a))
+    // The edges in turn, each with the corner where it begins.
+    let is_outside = [(ab, a), (bc, b), (-ac, c)].iter().any(|(edge, corner)| edge.cross(p - corner).dot(normal) < 0.0);
+    if is_outside {
+        distance_to_edge(p, a, ab).min(distance_to_edge(p, b, bc)).min(distance_to_edge(p, a, ac))
     } else {
         ((p - a).dot(normal) / normal.length().max(1e-30)).abs()
     }
+}
+
+/// Distance from a point to the straight line from `corner` to `corner + edge`.
+fn distance_to_edge(p: Vec3, corner: Vec3, edge: Vec3) -> f32 {
+    let along = ((p - corner).dot(edge) / edge.length_squared().max(1e-30)).clamp(0.0, 1.0);
+    (p - corner - edge * along).length()
 }
 
 #[cfg(test)]

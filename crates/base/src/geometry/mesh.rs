@@ -63,8 +63,8 @@ impl Mesh {
         if vertices.len() > MAX_VERTICES {
             return Err(MeshError::TooManyVertices { found: vertices.len() });
         }
-        let near = |vertex: &[f32; 3]| vertex.iter().all(|value| value.abs() <= 1e6);
-        if let Some(vertex) = vertices.iter().position(|vertex| !near(vertex)) {
+        // Written so that NaN is out of bounds, too.
+        if let Some(vertex) = vertices.iter().position(|vertex| !vertex.iter().all(|value| value.abs() <= 1e6)) {
             return Err(MeshError::VertexOutOfBounds { vertex });
         }
         for (triangle, indices) in triangles.iter().enumerate() {

@@ -95,8 +95,9 @@ impl PointCloud {
         velocities: Vec<[f32; 3]>,
         quantities: BTreeMap<Quantity, Vec<f32>>,
     ) -> Self {
-        let relative = |position: [f64; 3]| std::array::from_fn(|axis| (position[axis] - origin[axis]) as f32);
-        Self { origin, positions: positions.map(relative).collect(), velocities, quantities }
+        let positions =
+            positions.map(|position| std::array::from_fn(|axis| (position[axis] - origin[axis]) as f32)).collect();
+        Self { origin, positions, velocities, quantities }
     }
 
     /// The position of particle `index` in the world, m.
@@ -112,10 +113,12 @@ impl PointCloud {
             self.origin = other.origin;
         }
         let shift: [f32; 3] = std::array::from_fn(|axis| (other.origin[axis] - self.origin[axis]) as f32);
-        let moved = |position: &[f32; 3]| std::array::from_fn(|axis| position[axis] + shift[axis]);
+        let positions = other.positions.iter();
         match other.origin == self.origin {
             true => self.positions.extend_from_slice(&other.positions),
-            false => self.positions.extend(other.positions.iter().map(moved)),
+            false => self
+                .positions
+                .extend(positions.map(|position| std::array::from_fn::<_, 3, _>(|axis| position[axis] + shift[axis]))),
         }
         self.velocities.extend_from_slice(&other.velocities);
         for (quantity, values) in &other.quantities {

@@ -339,11 +339,12 @@ pub trait Assets: Send + Sync {
     fn depth(&self, path: &str, frame: i64, layer: Option<&str>) -> Result<Arc<DepthMap>, AssetError> {
         let layers = PictureLayers { image: None, depth: layer.map(str::to_owned) };
         let picture = self.picture_layers(path, frame, &layers)?;
-        let missing = || AssetError { path: path.to_owned(), problem: AssetProblem::NoChannel("Z".into()) };
-        let values = picture.depth.as_ref().ok_or_else(missing)?;
-        let pixels = values.iter().map(|&value| [value]).collect();
-        let values = Image::from_pixels(picture.color.width(), picture.color.height(), pixels).ok_or_else(missing)?;
-        Ok(Arc::new(DepthMap { values, remarks: picture.remarks.clone() }))
+        let (width, height) = (picture.color.width(), picture.color.height());
+        let pixels = picture.depth.as_ref().map(|values| values.iter().map(|&value| [value]).collect());
+        match pixels.and_then(|pixels| Image::from_pixels(width, height, pixels)) {
+            Some(values) => Ok(Arc::new(DepthMap { values, remarks: picture.remarks.clone() })),
+            None => Err(AssetError { path: path.to_owned(), problem: AssetProblem::NoChannel("Z".into()) }),
+        }
     }
 
     /// All triangles of the scene at `path`, in its own coordinates.

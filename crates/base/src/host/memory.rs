@@ -8,9 +8,14 @@ const OVERHEAD_BYTES: f64 = (256 << 20) as f64;
 /// Whether that many bytes can be allocated. They are reserved and released without being touched. Under a fuzzer, which counts
 /// reserved memory as used, nothing is reserved and amounts from 1 GiB on are refused.
 pub fn can_allocate(bytes: f64) -> bool {
-    let reserves = || Vec::<u8>::new().try_reserve_exact((bytes + OVERHEAD_BYTES) as usize).is_ok();
+    if bytes < UNCHECKED_BYTES {
+        return true;
+    }
     // NaN would be cast to 0 bytes.
-    bytes < UNCHECKED_BYTES || (!cfg!(fuzzing) && !bytes.is_nan() && reserves())
+    if cfg!(fuzzing) || bytes.is_nan() {
+        return false;
+    }
+    Vec::<u8>::new().try_reserve_exact((bytes + OVERHEAD_BYTES) as usize).is_ok()
 }
 
 /// A number of bytes for messages: in GiB, MiB or KiB with one decimal, or in bytes.
@@ -25,8 +30,8 @@ pub fn format_bytes(bytes: u64) -> String {
 /// The largest multiple of a twentieth of `count` for which `fits` holds; 0 if there is none.
 pub fn largest_fitting_count(count: i64, fits: impl Fn(i64) -> bool) -> i64 {
     // Avoids overflow, and keeps the remainder of the division for small counts.
-    let fraction = |twentieths: i64| count / 20 * twentieths + count % 20 * twentieths / 20;
-    (1..=20).rev().map(fraction).find(|&candidate| fits(candidate)).unwrap_or(0)
+    let mut fractions = (1..=20).rev().map(|twentieths| count / 20 * twentieths + count % 20 * twentieths / 20);
+    fractions.find(|&candidate| fits(candidate)).unwrap_or(0)
 }
 
 #[cfg(test)]

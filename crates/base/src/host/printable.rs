@@ -33,14 +33,15 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 /// assert_eq!(bansho_base::host::printable::with_control_pictures("a\t=\x1b[2J\u{202e}"), "a =\u{241b}[2J\u{fffd}");
 /// ```
 pub fn with_control_pictures(text: &str) -> String {
-    let picture = |character: char| match character {
+    let shown = text.chars().map(|character| match character {
         '\t' => ' ',
+        // The block Control Pictures of Unicode is in the order of the control characters.
         '\0'..='\x1f' => char::from_u32(0x2400 + u32::from(character)).unwrap_or(char::REPLACEMENT_CHARACTER),
         '\x7f' => '\u{2421}',
         other if is_control_or_bidi(other) => char::REPLACEMENT_CHARACTER,
         other => other,
-    };
-    text.chars().map(picture).collect()
+    });
+    shown.collect()
 }
 
 /// Number of characters shown of the start and of the end of a text that is shortened.
@@ -56,16 +57,13 @@ const EXCERPT_LENGTHS: [usize; 2] = [2000, 1000];
 /// ```
 pub fn printable_excerpt(text: &str) -> Cow<'_, str> {
     let [first, last] = EXCERPT_LENGTHS;
-    let cut = |(start, _): (usize, char)| start;
-    let (Some(end), Some(start)) =
-        (text.char_indices().nth(first).map(cut), text.char_indices().rev().nth(last - 1).map(cut))
-    else {
-        return printable(text);
-    };
-    if end >= start {
-        return printable(text);
+    // Where the beginning ends, and where the end begins: without a middle between them the whole text is shown.
+    match (text.char_indices().nth(first), text.char_indices().rev().nth(last - 1)) {
+        (Some((end, _)), Some((start, _))) if end < start => {
+            Cow::Owned(format!("{} [...] {}", printable(&text[..end]), printable(&text[start..])))
+        }
+        _ => printable(text),
     }
-    Cow::Owned(format!("{} [...] {}", printable(&text[..end]), printable(&text[start..])))
 }
 
 /// Whether it is a control character, a line or paragraph separator, or a formatting character of the Unicode bidirectional algorithm (UAX #9), which

@@ -21,11 +21,11 @@ impl<T, M: Fn() -> T> ScratchPool<T, M> {
     /// Runs `task` with a scratch object, which is in the state in which the previous task left it.
     #[inline(always)]
     pub fn with<R>(&self, task: impl FnOnce(&mut T) -> R) -> R {
-        let free = || self.free.lock().unwrap_or_else(PoisonError::into_inner);
-        let scratch = free().pop();
+        // Its own statement, so that the lock is released before an object is created.
+        let scratch = self.free.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = scratch.unwrap_or_else(&self.create);
         let result = task(&mut scratch);
-        free().push(scratch);
+        self.free.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
         result
     }
 }

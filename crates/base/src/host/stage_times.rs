@@ -127,12 +127,11 @@ impl StageTimes {
 
 impl Clocks {
     fn part_index(&mut self, part: StagePart) -> usize {
-        let is_same = |known: &PartTimes| {
-            known.phenomenon.as_deref() == part.phenomenon
-                && (known.stage, known.is_mirrored) == (part.stage, part.is_mirrored)
-        };
-        self.parts.iter().position(is_same).unwrap_or_else(|| {
-            let StagePart { stage, phenomenon, is_mirrored } = part;
+        let StagePart { stage, phenomenon, is_mirrored } = part;
+        let index = self.parts.iter().position(|known| {
+            known.phenomenon.as_deref() == phenomenon && (known.stage, known.is_mirrored) == (stage, is_mirrored)
+        });
+        index.unwrap_or_else(|| {
             let phenomenon = phenomenon.map(str::to_owned);
             self.parts.push(PartTimes { stage, phenomenon, is_mirrored, frames: Vec::new() });
             self.parts.len() - 1

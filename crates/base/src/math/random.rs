@@ -212,28 +212,30 @@ fn poisson_cornish_fisher(mean: f64, u: f64) -> u64 {
     (x + 0.5).floor().max(0.0) as u64
 }
 
+/// Acklam's approximation below the probability 0.02425, where the quantile grows with the logarithm of `p`.
+fn tail_quantile(p: f64) -> f64 {
+    let r = math::sqrt(-2.0 * math::ln(p));
+    polynomial(
+        r,
+        [
+            -7.784894002430293e-3,
+            -3.223964580411365e-1,
+            -2.400758277161838,
+            -2.549732539343734,
+            4.374664141464968,
+            2.938163982698783,
+        ],
+    ) / polynomial(r, [7.784695709041462e-3, 3.224671290700398e-1, 2.445134137142996, 3.754408661907416, 1.0])
+}
+
 /// Quantile of the standard normal distribution at the probability `p`, 0 < p < 1;
 /// relative error below 1.2e-9 (Acklam's rational approximation).
 fn normal_quantile(p: f64) -> f64 {
-    let tail = |q: f64| {
-        let r = math::sqrt(-2.0 * math::ln(q));
-        polynomial(
-            r,
-            [
-                -7.784894002430293e-3,
-                -3.223964580411365e-1,
-                -2.400758277161838,
-                -2.549732539343734,
-                4.374664141464968,
-                2.938163982698783,
-            ],
-        ) / polynomial(r, [7.784695709041462e-3, 3.224671290700398e-1, 2.445134137142996, 3.754408661907416, 1.0])
-    };
     if p < 0.02425 {
-        return tail(p);
+        return tail_quantile(p);
     }
     if p > 1.0 - 0.02425 {
-        return -tail(1.0 - p);
+        return -tail_quantile(1.0 - p);
     }
     let q = p - 0.5;
     let r = q * q;

@@ -128,15 +128,15 @@ where
         let amplitudes: Vec<f32> =
             std::iter::successors(Some(1.0), |a| Some(a * fractal.gain)).take(fractal.octaves as usize).collect();
         let sum: f32 = amplitudes.iter().sum();
-        let octave = |(index, amplitude): (usize, f32)| Octave {
+        let octaves = amplitudes.into_iter().enumerate().map(|(index, amplitude)| Octave {
             seed: murmur3(&(index as u32).to_le_bytes(), seed),
             ratio: if index == 0 { 1 } else { fractal.lacunarity },
             // With multiples of 1/256 the sum of shift and fraction is exact enough never to skip a cell.
             shift: std::array::from_fn(|axis| (murmur3(&[index as u8, axis as u8, 1], seed) >> 24) as f32 / 256.0),
             periods: periods.map(|period| if period == 0 { 0 } else { period * fractal.lacunarity.pow(index as u32) }),
             amplitude: amplitude / sum,
-        };
-        Ok(Self { octaves: amplitudes.into_iter().enumerate().map(octave).collect(), periods })
+        });
+        Ok(Self { octaves: octaves.collect(), periods })
     }
 
     /// Value at one point. In loops use [`row`](Self::row) or [`lanes`](Self::lanes), which give the same bits and are many times faster.
@@ -253,17 +253,15 @@ fn check(fractal: &Fractal, periods: &[u32]) -> Result<(), NoiseError> {
     if !(0.0..=16.0).contains(&gain) {
         return Err(NoiseError::Gain(gain));
     }
-    let fits = |period: u32| {
-        period == 0
-            || (lacunarity as u64)
-                .checked_pow(octaves - 1)
-                .and_then(|finest| finest.checked_mul(period as u64))
-                .is_some_and(|cells| cells <= 1 << 31)
-    };
-    match periods.iter().find(|&&period| !fits(period)) {
-        Some(&period) => Err(NoiseError::Period { period, octaves }),
-        None => Ok(()),
+    // The cells of the finest octave within a period are counted by 32 bits, with a sign.
+    let finest = (lacunarity as u64).checked_pow(octaves - 1);
+    for period in periods.iter().copied().filter(|&period| period > 0) {
+        let cells = finest.and_then(|finest| finest.checked_mul(period as u64));
+        if cells.is_none_or(|cells| cells > 1 << 31) {
+            return Err(NoiseError::Period { period, octaves });
+        }
     }
+    Ok(())
 }
 
 #[cfg(test)]

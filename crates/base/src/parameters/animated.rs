@@ -80,11 +80,11 @@ impl<T: Animate> Animated<T> {
     /// # Errors
     /// There are no keys, the times are not ascending, a number is not finite, or the curve is too steep; see [`Curve::new`].
     pub fn keyed(keys: Vec<(f64, T)>, interpolation: Interpolation) -> Result<Self, CurveError> {
-        let curve = |component: usize| {
+        let mut curves = Vec::with_capacity(T::COMPONENTS);
+        for component in 0..T::COMPONENTS {
             let points = keys.iter().map(|(time, value)| [*time, value.component(component)]).collect();
-            Curve::new(points, interpolation)
-        };
-        let curves: Vec<Curve> = (0..T::COMPONENTS).map(curve).collect::<Result<_, _>>()?;
+            curves.push(Curve::new(points, interpolation)?);
+        }
         Ok(Self { motion: Motion::Keyed(curves), period: None })
     }
 
@@ -159,12 +159,15 @@ impl<T: Animate> Animated<T> {
 
     /// Integral over time from `from` to `to`, exact up to rounding: the distance covered at a keyframed speed, so that any single frame is correct.
     pub fn integral(&self, from: f64, to: f64) -> T {
-        let keyed = |curve: &Curve| {
-            let Some(period) = self.period else { return curve.integral(from, to) };
-            let [(before, from), (after, to)] = [from, to].map(|t| self.split_period(t));
-            (after - before).mul_add(curve.integral(0.0, period), curve.integral(from, to))
-        };
-        self.map_components(|value| value * (to - from), keyed)
+        // Whole periods between the two times are the same each; without a period there are none.
+        let [(before, start), (after, end)] = [from, to].map(|t| self.split_period(t));
+        self.map_components(
+            |value| value * (to - from),
+            |curve| match self.period {
+                None => curve.integral(from, to),
+                Some(period) => (after - before).mul_add(curve.integral(0.0, period), curve.integral(start, end)),
+            },
+        )
     }
 
     /// Number of complete periods before time `t`, and the time within the current period.
@@ -215,8 +218,8 @@ impl<T: Animate> Animated<T> {
             return keys;
         }
         let count = ((to - from) * RATE).ceil().max(1.0) as usize;
-        let at = |index: usize| crate::math::lerp(from, to, index as f64 / count as f64);
-        (0..=count).map(|index| (at(index), self.at(at(index)))).collect()
+        let times = (0..=count).map(|index| crate::math::lerp(from, to, index as f64 / count as f64));
+        times.map(|time| (time, self.at(time))).collect()
     }
 
     /// The value if it is constant: it has no keys, or all keys have the same value.
@@ -247,11 +250,11 @@ impl<T: Animate> Animated<T> {
     pub fn keys(&self) -> Vec<(f64, T)> {
         match &self.motion {
             Motion::Keyed(curves) if !curves.is_empty() => {
-                let key = |index: usize| {
-                    let time = curves[0].points()[index][0];
-                    (time, T::from_components(|component| curves[component].points()[index][1]))
-                };
-                (0..curves[0].points().len()).map(key).collect()
+                // All components have their keys at the same times.
+                let keys = curves[0].points().iter().enumerate().map(|(index, [time, _])| {
+                    (*time, T::from_components(|component| curves[component].points()[index][1]))
+                });
+                keys.collect()
             }
             Motion::Keyed(_) | Motion::Constant(_) => Vec::new(),
         }
@@ -279,22 +282,20 @@ fn own_side(curves: &[Curve], middle: f64, longest_cut_s: f64) -> Option<std::op
     /// How many times longer than a cut the intervals before and after it are at least.
     const ISOLATION: f64 = 10.0;
     let times = curves.first()?.points();
-    let interval = |index: usize| match times.get(index..index + 2) {
-        Some(pair) => pair[1][0] - pair[0][0],
-        None => f64::INFINITY,
-    };
+    let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
     // Decimal times are rounded.
     let longest = longest_cut_s * (1.0 + 1e-6) + STEP_TOLERANCE_S;
-    let is_cut = |index: &usize| {
-        let length = interval(*index);
-        let before = index.checked_sub(1).map_or(f64::INFINITY, interval);
-        length <= longest
-            && before.min(interval(index + 1)) >= ISOLATION * length
-            && curves.iter().any(|curve| curve.points()[*index][1] != curve.points()[index + 1][1])
-    };
     let mut side = 0..times.len();
-    let cuts = (0..times.len().saturating_sub(1)).filter(is_cut);
-    for cut in cuts {
+    for (cut, &length) in intervals.iter().enumerate() {
+        // Before the first key and after the last one nothing moves.
+        let before = cut.checked_sub(1).map_or(f64::INFINITY, |before| intervals[before]);
+        let after = intervals.get(cut + 1).copied().unwrap_or(f64::INFINITY);
+        let is_cut = length <= longest
+            && before.min(after) >= ISOLATION * length
+            && curves.iter().any(|curve| curve.points()[cut][1] != curve.points()[cut + 1][1]);
+        if !is_cut {
+            continue;
+        }
         if middle + STEP_TOLERANCE_S >= times[cut + 1][0] {
             side.start = cut + 1;
         } else {

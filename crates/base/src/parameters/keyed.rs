@@ -114,18 +114,24 @@ impl Default for CurveLimits {
 }
 
 fn read_points(items: &[Node], limits: &CurveLimits, expected: &Kind, reader: &mut Reader) -> Option<Vec<[f64; 2]>> {
-    let read_point = |item: &Node, reader: &mut Reader| match &item.value {
-        Value::List(pair) if pair.len() == 2 => Some([
-            read_number(&pair[0], &limits.x, "", expected, reader)?,
-            read_number(&pair[1], &limits.y, "", expected, reader)?,
-        ]),
+    let points = items.iter().enumerate().map(|(index, item)| {
+        reader.within(index.to_string(), |reader| {
+            let [x, y] = read_pair(item, expected, reader)?;
+            Some([read_number(x, &limits.x, "", expected, reader)?, read_number(y, &limits.y, "", expected, reader)?])
+        })
+    });
+    points.collect()
+}
+
+/// The two nodes of a list of two; anything else is reported.
+fn read_pair<'a>(item: &'a Node, expected: &Kind, reader: &mut Reader) -> Option<[&'a Node; 2]> {
+    match &item.value {
+        Value::List(pair) if pair.len() == 2 => Some([&pair[0], &pair[1]]),
         _ => {
             reader.wrong_type(item, expected);
             None
         }
-    };
-    let within = |(index, item): (usize, &Node)| reader.within(index.to_string(), |reader| read_point(item, reader));
-    items.iter().enumerate().map(within).collect()
+    }
 }
 
 impl Parameter for Curve {
@@ -211,19 +217,14 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
         if !check_point_count(items, node, reader) {
             return None;
         }
-        let read_key = |item: &Node, reader: &mut Reader| match &item.value {
-            Value::List(pair) if pair.len() == 2 => {
-                let time = read_number(&pair[0], &Range::default(), "s", &expected, reader)?;
-                Some((time, T::read(&pair[1], limits, unit, reader)?))
-            }
-            _ => {
-                reader.wrong_type(item, &expected);
-                None
-            }
-        };
-        let within =
-            |(index, item): (usize, &Node)| reader.within(format!("keys.{index}"), |reader| read_key(item, reader));
-        let keys: Vec<(f64, T)> = items.iter().enumerate().map(within).collect::<Option<_>>()?;
+        let keys = items.iter().enumerate().map(|(index, item)| {
+            reader.within(format!("keys.{index}"), |reader| {
+                let [time, value] = read_pair(item, &expected, reader)?;
+                let time = read_number(time, &Range::default(), "s", &expected, reader)?;
+                Some((time, T::read(value, limits, unit, reader)?))
+            })
+        });
+        let keys: Vec<(f64, T)> = keys.collect::<Option<_>>()?;
         match Self::keyed(keys, interpolation) {
             Ok(mut animated) => {
                 if let Some(frame_rate) = reader.frame_rate() {
@@ -256,11 +257,11 @@ impl<T: Parameter + Animate> Parameter for Animated<T> {
         if let Some(constant) = self.constant() {
             return constant.to_value();
         }
-        let key = |(time, value): (f64, T)| {
+        let keys = self.keys().into_iter().filter_map(|(time, value)| {
             Some(Value::List(vec![Value::Number(time).into(), value.to_value()?.into()]).into())
-        };
+        });
         let mut table = Table::default();
-        table.push("keys", Value::List(self.keys().into_iter().filter_map(key).collect()));
+        table.push("keys", Value::List(keys.collect()));
         table.push("interpolation", Value::Text(interpolation_name(self.interpolation()).name().into()));
         Some(Value::Table(table))
     }

@@ -161,11 +161,11 @@ impl BuildError {
 /// The list items on a path, counted from 1: ` (shape 2, sheet 1)`. The first table of its kind needs no number.
 fn items(path: &str) -> String {
     let segments: Vec<&str> = path.split('.').collect();
-    let item = |(depth, pair): (usize, &[&str])| {
+    let items = segments.windows(2).enumerate().filter_map(|(depth, pair)| {
         let index: usize = pair[1].parse().ok().filter(|index| depth > 0 || *index > 0)?;
         Some(format!("{} {}", pair[0].strip_suffix('s').unwrap_or(pair[0]), index + 1))
-    };
-    let items: Vec<String> = segments.windows(2).enumerate().filter_map(item).collect();
+    });
+    let items: Vec<String> = items.collect();
     if items.is_empty() { String::new() } else { format!(" ({})", items.join(", ")) }
 }
 

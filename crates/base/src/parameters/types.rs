@@ -46,13 +46,14 @@ pub trait Parameters: Sized + Default {
 
     /// Reports keys that are neither parameters nor `ignored`.
     fn report_unknown(table: &Table, reader: &mut Reader, ignored: &[&str]) {
-        let known = || Self::table().parameters.iter().map(|parameter| parameter.key).chain(ignored.iter().copied());
+        let keys = Self::table().parameters.iter().map(|parameter| parameter.key);
+        let known: Vec<&str> = keys.chain(ignored.iter().copied()).collect();
         for entry in &table.entries {
-            if !known().any(|key| key == entry.key) {
+            if !known.contains(&&*entry.key) {
                 reader.report_with(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
                     key: entry.key.clone(),
-                    nearest: nearest(&entry.key, known()).map(str::to_owned),
-                    allowed: known().map(str::to_owned).collect(),
+                    nearest: nearest(&entry.key, known.iter().copied()).map(str::to_owned),
+                    allowed: known.iter().map(|key| (*key).to_owned()).collect(),
                 });
             }
         }
@@ -418,10 +419,11 @@ impl<T: Parameter> Parameter for Vec<T> {
             reader.report(node, ProblemKind::ListLength { found: items.len(), min: limits.min, max: limits.max });
             return None;
         }
-        let read_item = |(index, item): (usize, &Node)| {
-            reader.within(index.to_string(), |reader| T::read(item, &limits.item, unit, reader))
-        };
-        items.iter().enumerate().map(read_item).collect()
+        let items = items
+            .iter()
+            .enumerate()
+            .map(|(index, item)| reader.within(index.to_string(), |reader| T::read(item, &limits.item, unit, reader)));
+        items.collect()
     }
 
     fn check(&self, limits: &Self::Limits, unit: &'static str, reader: &mut Reader) {

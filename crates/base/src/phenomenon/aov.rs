@@ -69,9 +69,9 @@ impl AovPlane {
             samples.for_each(|(index, (value, nearness))| self.keep(index, *value, *nearness));
             return;
         }
-        let add = |sums: &mut [f32], more: &[f32]| sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
-        add(&mut self.values, &other.values);
-        add(&mut self.weights, &other.weights);
+        for (sums, more) in [(&mut self.values, &other.values), (&mut self.weights, &other.weights)] {
+            sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+        }
     }
 
     /// Adds the samples of another plane of the same size and AOV with a factor for their weights.
@@ -79,11 +79,9 @@ impl AovPlane {
         if rule == AovRule::Nearest {
             return self.add_plane(other, rule);
         }
-        let add = |sums: &mut [f32], more: &[f32]| {
+        for (sums, more) in [(&mut self.values, &other.values), (&mut self.weights, &other.weights)] {
             sums.iter_mut().zip(more).for_each(|(sum, more)| *sum = weight.fma(*more, *sum));
-        };
-        add(&mut self.values, &other.values);
-        add(&mut self.weights, &other.weights);
+        }
     }
 
     /// Blends with another plane of the same size and AOV: its own samples have the weight `own_weight`, the others the rest.

@@ -44,8 +44,9 @@ impl Shutter {
     /// Interval `index` of `count` equal intervals.
     #[must_use]
     pub fn part(&self, index: usize, count: usize) -> Self {
-        let end = |index: usize| self.open + self.duration() * index as f64 / count as f64;
-        Self { open: end(index), close: if index + 1 == count { self.close } else { end(index + 1) } }
+        let [open, close] = [index, index + 1].map(|index| self.open + self.duration() * index as f64 / count as f64);
+        // The last interval ends exactly where the whole one does.
+        Self { open, close: if index + 1 == count { self.close } else { close } }
     }
 
     /// Number of equal parts of the exposure, a power of two, in each of which a flame hardly flickers, and its light of a radius (m) hardly moves that moves
@@ -241,18 +242,15 @@ impl View {
             return 0.0;
         }
         let [(_, open), .., (_, close)] = cameras.0;
-        let motion = |before: &Camera, after: &Camera, [x, y]: [f64; 2]| {
-            let direction_at = |camera: &Camera| camera.direction(DVec2::new(x * camera.size[0], y * camera.size[1]));
-            let pair = direction_at(before).zip(direction_at(after));
-            pair.map_or(0.0, |(a, b)| math::acos(a.normalize().dot(b.normalize()).clamp(-1.0, 1.0)) * open.focal_pixels)
-        };
-        let largest = |position: [f64; 2]| {
-            let displacement = motion(&open, &close, position);
+        let mut largest: f64 = 0.0;
+        for position in SAMPLE_POSITIONS {
+            let displacement = angle_between(&open, &close, position) * open.focal_pixels;
             // A camera that shakes may end where it began.
-            let path: f64 = cameras.0.windows(2).map(|pair| motion(&pair[0].1, &pair[1].1, position)).sum();
-            if path > DETOUR * displacement + 0.1 { path } else { displacement }
-        };
-        SAMPLE_POSITIONS.map(largest).into_iter().fold(0.0, f64::max)
+            let pairs = cameras.0.windows(2);
+            let path: f64 = pairs.map(|pair| angle_between(&pair[0].1, &pair[1].1, position) * open.focal_pixels).sum();
+            largest = largest.max(if path > DETOUR * displacement + 0.1 { path } else { displacement });
+        }
+        largest
     }
 
     /// Cameras at the time samples of the exposure, with equal weights. Their number follows from the motion of distant objects in the picture; it is
@@ -297,13 +295,19 @@ impl PathCameras {
             let direction = camera.point_in_camera(point(t)).try_normalize().unwrap_or_default();
             (direction, camera.focal_pixels)
         });
-        let motion = |pair: &[(DVec3, f64)]| {
+        let motions = positions.windows(2).map(|pair| {
             let [(from, from_focal), (to, to_focal)] = [pair[0], pair[1]];
             // A zoom moves what is beside the optical axis.
             (to - from).length() * to_focal + (to_focal - from_focal).abs() * math::hypot(to.x, to.y)
-        };
-        positions.windows(2).map(motion).sum()
+        });
+        motions.sum()
     }
+}
+
+/// The angle between the directions of two cameras at a position in the picture, as fractions of its size, rad; 0 where a lens shows nothing there.
+fn angle_between(before: &Camera, after: &Camera, [x, y]: [f64; 2]) -> f64 {
+    let [from, to] = [before, after].map(|camera| camera.direction(DVec2::new(x * camera.size[0], y * camera.size[1])));
+    from.zip(to).map_or(0.0, |(from, to)| math::acos(from.normalize().dot(to.normalize()).clamp(-1.0, 1.0)))
 }
 
 /// Number of equal parts of an exposure so that what moves by `pixels` moves by at most `pixels_per_part` in each, at most `max_count`.

@@ -245,11 +245,11 @@ impl PublishedByAll {
     /// The publications of all phenomena, in their order.
     #[must_use]
     pub fn new(publications: Vec<Publication>) -> Self {
-        let indices = |is_listed: fn(&Publication) -> bool| -> Vec<usize> {
-            (0..publications.len()).filter(|&index| is_listed(&publications[index])).collect()
-        };
-        let with_lights = indices(|publication| !publication.lights.is_empty());
-        let with_occluders = indices(|publication| !publication.occluders.is_empty());
+        let (mut with_lights, mut with_occluders) = (Vec::new(), Vec::new());
+        for (index, publication) in publications.iter().enumerate() {
+            with_lights.extend((!publication.lights.is_empty()).then_some(index));
+            with_occluders.extend((!publication.occluders.is_empty()).then_some(index));
+        }
         Self { publications, with_lights, with_occluders }
     }
 

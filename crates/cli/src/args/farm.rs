@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bansho::farm::products::{FlipbookRequest, Products};
+use bansho_farm::products::{FlipbookRequest, Products};
 use clap::{Args, Subcommand};
 
 use super::{

@@ -9,9 +9,8 @@ use bansho::{
 use clap::Args;
 
 use super::{
-    input::InputArgs,
+    shared::{InputArgs, OverwriteArgs, WorkArgs},
     values,
-    work::{OverwriteArgs, WorkArgs},
 };
 
 /// Options of a flipbook.

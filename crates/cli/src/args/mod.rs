@@ -2,13 +2,12 @@
 
 mod farm;
 mod flipbook;
-mod input;
 mod plot;
 mod render;
+mod shared;
 mod simulate;
 mod streaks;
 mod values;
-mod work;
 
 use std::path::PathBuf;
 
@@ -20,13 +19,12 @@ pub(crate) use self::{
         TaskArgs, TaskCommand, ThreadArgs, TileArgs,
     },
     flipbook::FlipbookArgs,
-    input::InputArgs,
     plot::{ColorTexture, DeflectionArgs, KernelTexture, PlotArgs, PlotCommand, PlotOutputArgs},
     render::RenderArgs,
+    shared::{InputArgs, ProgressKind, WorkArgs},
     simulate::SimulateArgs,
     streaks::StreaksArgs,
     values::{ChunkLength, Frames, Numbers},
-    work::{ProgressKind, WorkArgs},
 };
 
 /// Fire, rain and aurora for pictures: image sequences with alpha, to composite over a plate.

@@ -16,8 +16,8 @@ use clap::{
 };
 
 use super::{
+    shared::OverwriteArgs,
     values::{self, Numbers},
-    work::OverwriteArgs,
 };
 
 /// What to plot.
@@ -314,6 +314,7 @@ fn number(text: &str, min: f64, max: f64, unit: &'static str) -> Result<f64, Ran
     value.ok_or(RangeError::Number { min, max, unit })
 }
 
+/// Up to [`MOST_CURVES`] numbers with commas between, each as `parse` reads it, from `min` to `max`.
 fn list(
     text: &str,
     parse: impl Fn(&str) -> Option<f64>,
@@ -321,10 +322,10 @@ fn list(
     max: f64,
     unit: &'static str,
 ) -> Result<Numbers, RangeError> {
-    let value = |text: &str| parse(text.trim()).filter(|value| (min..=max).contains(value));
-    let numbers: Option<Vec<f64>> = text.split(',').map(value).collect();
-    let numbers = numbers.filter(|numbers| numbers.len() <= MOST_CURVES);
-    numbers.map(Numbers).ok_or(RangeError::List { min, max, unit })
+    let numbers: Option<Vec<f64>> = text.split(',').map(|text| parse(text.trim())).collect();
+    let allowed = numbers
+        .filter(|numbers| numbers.len() <= MOST_CURVES && numbers.iter().all(|value| (min..=max).contains(value)));
+    allowed.map(Numbers).ok_or(RangeError::List { min, max, unit })
 }
 
 fn parse_kelvin(text: &str) -> Result<f64, RangeError> {

@@ -9,9 +9,8 @@ use bansho::{
 use clap::Args;
 
 use super::{
-    input::InputArgs,
+    shared::{InputArgs, OverwriteArgs, StateArgs, WorkArgs},
     values::{self, Frames},
-    work::{OverwriteArgs, StateArgs, WorkArgs},
 };
 
 /// Options of rendering.

@@ -6,9 +6,8 @@ use bansho::job::{JobError, Simulate};
 use clap::Args;
 
 use super::{
-    input::InputArgs,
+    shared::{InputArgs, OverwriteArgs, StateArgs, WorkArgs},
     values::{self, Frames},
-    work::{OverwriteArgs, StateArgs, WorkArgs},
 };
 
 /// Options of a simulation.

@@ -9,8 +9,8 @@ use bansho::{
 };
 
 use super::{
+    shared::{OverwriteArgs, WorkArgs},
     values::{self, Numbers},
-    work::{OverwriteArgs, WorkArgs},
 };
 use clap::Args;
 

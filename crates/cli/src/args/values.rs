@@ -62,8 +62,8 @@ pub(crate) struct Numbers(pub(crate) Vec<f64>);
 /// Two whole numbers between 1 and `max`.
 fn pair(text: &str, max: usize) -> Option<[usize; 2]> {
     let (first, second) = text.split_once(['x', 'X'])?;
-    let side = |text: &str| text.parse().ok().filter(|side| (1..=max).contains(side));
-    Some([side(first)?, side(second)?])
+    let sides = [first.parse().ok()?, second.parse().ok()?];
+    sides.iter().all(|side| (1..=max).contains(side)).then_some(sides)
 }
 
 pub(super) fn parse_size(text: &str) -> Result<[usize; 2], ValueError> {
@@ -118,12 +118,11 @@ pub(super) fn parse_vector(text: &str) -> Result<[f64; 3], ValueError> {
 
 /// A time in seconds, or a fraction such as 1/30.
 pub(super) fn parse_exposure(text: &str) -> Result<f64, ValueError> {
-    let number = |text: &str| text.trim().parse::<f64>().ok();
-    let seconds = match text.split_once('/') {
-        Some((over, under)) => number(over).zip(number(under)).map(|(over, under)| over / under),
-        None => number(text),
-    };
-    seconds.filter(|seconds| seconds.is_finite()).ok_or(ValueError::Exposure)
+    let (over, under) = text.split_once('/').unwrap_or((text, "1"));
+    match (over.trim().parse::<f64>(), under.trim().parse::<f64>()) {
+        (Ok(over), Ok(under)) if (over / under).is_finite() => Ok(over / under),
+        _ => Err(ValueError::Exposure),
+    }
 }
 
 /// A number of bytes: decimal units (kB, MB, GB, TB) or binary ones (KiB, MiB, GiB, TiB).
@@ -139,9 +138,13 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, ValueError> {
         ("TB", 1_000_000_000_000),
         ("B", 1),
     ];
-    let number = |(unit, bytes): (&str, u64)| Some((text.strip_suffix(unit)?.trim_end().parse::<u64>().ok()?, bytes));
-    let (count, bytes) = UNITS.into_iter().find_map(number).ok_or(ValueError::Bytes)?;
-    count.checked_mul(bytes).ok_or(ValueError::Bytes)
+    // A byte alone is last: every unit ends in B.
+    for (unit, bytes) in UNITS {
+        if let Some(Ok(count)) = text.strip_suffix(unit).map(|count| count.trim_end().parse::<u64>()) {
+            return count.checked_mul(bytes).ok_or(ValueError::Bytes);
+        }
+    }
+    Err(ValueError::Bytes)
 }
 
 pub(super) fn parse_folder(text: &str) -> Result<PathBuf, ValueError> {

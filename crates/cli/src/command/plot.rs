@@ -21,8 +21,11 @@ use crate::{
     args::{DeflectionArgs, KernelTexture, Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
     output::print,
     plot::{
-        PlotError, aurora, beam, black_body, csv, deflection, draw, figure::Figure, flame_shape, kernel, metadata,
-        parameters, rain, texture::FigureTexture, transfer_curves,
+        PlotError, aurora, beam, black_body, csv, draw,
+        figure::Figure,
+        flame_shape, kernel, metadata, parameters, rain,
+        texture::{self, FigureTexture},
+        transfer_curves,
     },
 };
 
@@ -100,7 +103,7 @@ fn read(path: &Path) -> Result<SceneFile, JobError> {
 /// Draws the deflection of a frame, and prints how much it is.
 fn plot_deflection(args: &DeflectionArgs) -> anyhow::Result<()> {
     let DeflectionArgs { scene, frame, full_scale, .. } = args;
-    let drawn = deflection::deflection(&read(scene)?, *frame, *full_scale)?;
+    let drawn = texture::deflection(&read(scene)?, *frame, *full_scale)?;
     let inputs = std::slice::from_ref(scene);
     finish_texture("deflection", &drawn.texture, &args.output, inputs)?;
     Ok(print(&format!(

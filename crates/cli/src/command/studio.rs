@@ -54,8 +54,8 @@ pub(crate) fn run(args: &StudioArgs) -> anyhow::Result<()> {
 /// Whether the environment names a display. Always true on systems without such variables.
 fn has_display() -> bool {
     let needed = cfg!(all(unix, not(any(target_os = "macos", target_os = "ios", target_os = "android"))));
-    let is_set = |name| env::var_os(name).is_some_and(|value| !value.is_empty());
-    !needed || ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(is_set)
+    let variables = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
+    !needed || variables.into_iter().any(|name| env::var_os(name).is_some_and(|value| !value.is_empty()))
 }
 
 /// The studio in the folder of this program, if it is there.

@@ -11,7 +11,7 @@ use bansho::aurora::{
 
 use super::{
     csv::{number, rows},
-    figure::{Axis, Figure, FigureTable, Panel, Plot, Rgb, Series, Style, bounds, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Rgb, Series, bounds},
     ticks,
 };
 
@@ -40,34 +40,29 @@ fn line_color(line: &Line) -> Rgb {
 
 /// An altitude axis that shows the profiles of some columns of a table whose first column is the altitude.
 fn altitude_axis(table: &FigureTable, columns: &[usize]) -> Axis {
-    let reach = |&column: &usize| {
+    let mut top = LOWEST_KM + 40.0;
+    for &column in columns {
         let most = table.bounds(&[column]).map_or(0.0, |[_, high]| high);
-        table.rows.iter().filter(|row| row[column] > FAINT * most).map(|row| row[0]).fold(LOWEST_KM, f64::max)
-    };
-    let top = columns.iter().map(reach).fold(LOWEST_KM + 40.0, f64::max);
+        top = table.rows.iter().filter(|row| row[column] > FAINT * most).map(|row| row[0]).fold(top, f64::max);
+    }
     Axis::linear("Altitude", "km", [LOWEST_KM, ticks::rounded([0.0, top], 12)[1]])
 }
 
 /// Volume emission rate of every line by altitude, for an energy in eV and an energy flux in mW/m^2.
 pub(crate) fn emission(energy_ev: f64, flux_mw_per_m2: f64, shape: SpectrumShape) -> Figure {
     let profile = Emission::new(atmosphere(), shape.spectrum()).profile(energy_ev);
-    let name = |line: &Line| {
-        let name = line.name.to_lowercase().replace("n2+", "n2_ion").replace([' ', '.'], "_");
-        format!("{name}_photons_per_m3_s")
-    };
-    let mut table = FigureTable::new(["altitude_km".to_owned()].into_iter().chain(LINES.iter().map(name)));
+    let mut table = FigureTable::of_functions("altitude_km", LINES.iter().map(line_column));
     for (level, photons) in profile.iter().enumerate() {
-        let rate = |line: &Line| flux_mw_per_m2 * line.photons * photons[line.emitter.index()];
-        table.rows.push([level_altitude_km(level)].into_iter().chain(LINES.iter().map(rate)).collect());
+        let rates = LINES.iter().map(|line| flux_mw_per_m2 * line.photons * photons[line.emitter.index()]);
+        table.push(level_altitude_km(level), rates);
     }
     let columns: Vec<usize> = (1..=LINES.len()).collect();
     let most = table.bounds(&columns).map_or(1.0, |[_, high]| high);
-    let curve = |(index, line): (usize, &Line)| Series {
-        label: pretty(line.name),
-        color: line_color(line),
-        style: Style::Line,
-        points: table.points(1 + index, 0),
-    };
+    let mut series = Vec::new();
+    for (index, line) in LINES.iter().enumerate() {
+        // The altitude is vertical, as in every figure of an atmosphere.
+        series.push(Series::curve(pretty(line.name), index, table.points(1 + index, 0)).colored(line_color(line)));
+    }
     Figure {
         title: format!(
             "Auroral emission for {} eV ({}) and {} mW/m²",
@@ -78,10 +73,16 @@ pub(crate) fn emission(energy_ev: f64, flux_mw_per_m2: f64, shape: SpectrumShape
         panels: vec![Panel::Plot(Plot {
             x: Axis::log("Volume emission rate", "photons m⁻³ s⁻¹", [DECADES * most, most]),
             y: altitude_axis(&table, &columns),
-            series: LINES.iter().enumerate().map(curve).collect(),
+            series,
         })],
         table,
     }
+}
+
+/// The column of a line's volume emission rate.
+fn line_column(line: &Line) -> String {
+    let name = line.name.to_lowercase().replace("n2+", "n2_ion").replace([' ', '.'], "_");
+    format!("{name}_photons_per_m3_s")
 }
 
 /// The name of a line with lowered and raised digits.
@@ -92,29 +93,28 @@ fn pretty(name: &str) -> String {
 /// Ionization rate by altitude for energies in eV. Times 35 eV it is the energy that is deposited.
 pub(crate) fn deposition(energies_ev: &[f64], shape: SpectrumShape) -> Figure {
     let deposition = Deposition::new(atmosphere(), shape.spectrum());
-    let name = |energy: &f64| format!("q_{}_ev_per_m3_s_per_mw_m2", number(*energy));
-    let mut table = FigureTable::new(["altitude_km".to_owned()].into_iter().chain(energies_ev.iter().map(name)));
+    let names = energies_ev.iter().map(|energy| format!("q_{}_ev_per_m3_s_per_mw_m2", number(*energy)));
+    let mut table = FigureTable::of_functions("altitude_km", names);
     for level in 0..atmosphere().levels().len() {
         let altitude_km = level_altitude_km(level);
-        let rate = |energy: &f64| deposition.ionization(*energy, altitude_km);
-        table.rows.push([altitude_km].into_iter().chain(energies_ev.iter().map(rate)).collect());
+        table.push(altitude_km, energies_ev.iter().map(|energy| deposition.ionization(*energy, altitude_km)));
     }
     let columns: Vec<usize> = (1..=energies_ev.len()).collect();
     let most = table.bounds(&columns).map_or(1.0, |[_, high]| high);
-    let curve = |(index, energy): (usize, &f64)| Series {
-        label: kiloelectronvolts(*energy),
-        color: color(index),
-        style: Style::Line,
-        points: table.points(1 + index, 0),
-    };
-    let mut series: Vec<Series> = energies_ev.iter().enumerate().map(curve).collect();
+    let mut series = Vec::new();
+    for (index, energy) in energies_ev.iter().enumerate() {
+        series.push(Series::curve(kiloelectronvolts(*energy), index, table.points(1 + index, 0)));
+    }
+    // The peaks are those of beams of one energy.
     if shape == SpectrumShape::Monoenergetic {
-        let is_shown = |row: &[f64; 3]| energies_ev.iter().any(|energy| (row[0] * 1e3 / energy - 1.0).abs() < 1e-6);
-        let points: Vec<_> =
-            rows::<3>(FANG_PEAKS).into_iter().filter(is_shown).map(|[_, altitude, rate]| [rate, altitude]).collect();
+        let mut points = Vec::new();
+        for [energy_kev, altitude, rate] in rows::<3>(FANG_PEAKS) {
+            if energies_ev.iter().any(|energy| (energy_kev * 1e3 / energy - 1.0).abs() < 1e-6) {
+                points.push([rate, altitude]);
+            }
+        }
         if !points.is_empty() {
-            let label = "peaks, Fang et al. (2010)".to_owned();
-            series.push(Series { label, color: color(6), style: Style::Markers, points });
+            series.push(Series::reference("peaks, Fang et al. (2010)", points));
         }
     }
     Figure {
@@ -132,7 +132,7 @@ fn kiloelectronvolts(energy_ev: f64) -> String {
     if energy_ev < 1000.0 { format!("{} eV", number(energy_ev)) } else { format!("{} keV", number(energy_ev / 1e3)) }
 }
 
-/// Upper states: name for the legend, for the column, and color.
+/// Upper states, in the order of [`EMITTERS`]: name for the legend, for the column, and color.
 const STATES: [(&str, &str, Rgb); 4] = [
     ("O(¹S): 557.7 nm", "o_1s_557_7_nm", [20, 150, 40]),
     ("O(¹D): 630.0, 636.4 nm", "o_1d_630_0_636_4_nm", [215, 35, 35]),
@@ -142,24 +142,20 @@ const STATES: [(&str, &str, Rgb); 4] = [
 
 /// Fraction of the excited states that radiate before a collision quenches them, by altitude.
 pub(crate) fn quenching() -> Figure {
-    let name = |state: &(&str, &str, Rgb)| format!("radiated_fraction_{}", state.1);
-    let mut table = FigureTable::new(["altitude_km".to_owned()].into_iter().chain(STATES.iter().map(name)));
+    let names = STATES.iter().map(|(_, column, _)| format!("radiated_fraction_{column}"));
+    let mut table = FigureTable::of_functions("altitude_km", names);
     for (level, air) in atmosphere().levels().iter().enumerate() {
-        let fractions = EMITTERS.map(|emitter| radiated_fraction(emitter, air));
-        table.rows.push([&[level_altitude_km(level)][..], &fractions].concat());
+        table.push(level_altitude_km(level), EMITTERS.map(|emitter| radiated_fraction(emitter, air)));
     }
-    let curve = |(index, state): (usize, &(&str, &str, Rgb))| Series {
-        label: state.0.to_owned(),
-        color: state.2,
-        // Its curve is mostly that of the other nitrogen.
-        style: if index == 3 { Style::Dashed } else { Style::Line },
-        points: table.points(1 + index, 0),
-    };
+    let mut series = Vec::new();
+    for (index, (label, _, color)) in STATES.into_iter().enumerate() {
+        let curve = Series::curve(label, index, table.points(1 + index, 0)).colored(color);
+        // The curve of N2(B) is mostly that of N2+(B), which would be hidden below a line.
+        series.push(if index == 3 { curve.dashed() } else { curve });
+    }
     let reference = rows::<5>(QUENCHING);
     let points = reference.iter().flat_map(|row| row[1..].iter().map(|&fraction| [fraction, row[0]])).collect();
-    let mut series: Vec<Series> = STATES.iter().enumerate().map(curve).collect();
-    let label = "Stern-Volmer, computed independently".to_owned();
-    series.push(Series { label, color: color(6), style: Style::Markers, points });
+    series.push(Series::reference("Stern-Volmer, computed independently", points));
     let top = bounds(reference.iter().map(|row| row[0])).map_or(500.0, |[_, high]| high);
     Figure {
         title: "Fraction of excited states that radiate: quenching by N₂, O₂ and O".to_owned(),

@@ -14,7 +14,7 @@ use bansho::{
 use super::{
     PlotError,
     csv::number,
-    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series},
 };
 
 /// Distances that are plotted, m.
@@ -31,9 +31,9 @@ pub(crate) fn figure(intensity: f64, [inner, outer]: [f64; 2], rates_mm_per_h: &
     let [cos_inner, cos_outer] = [inner, outer].map(|angle| math::cos(angle.to_radians()));
     let emitter = Emitter::Spot { position: DVec3::ZERO, axis: DVec3::X, cos_inner, cos_outer };
     let light = Light { emitter, intensity: [intensity as f32; 3] };
-    let name = |rate: &f64| format!("lux_at_{}_mm_per_h", number(*rate));
-    let columns = ["distance_m".to_owned()].into_iter().chain(rates_mm_per_h.iter().map(name));
-    let mut table = FigureTable::new(columns.chain(["angle_deg", "intensity_cd"].map(str::to_owned)));
+    let columns = rates_mm_per_h.iter().map(|rate| format!("lux_at_{}_mm_per_h", number(*rate)));
+    let mut table =
+        FigureTable::of_functions("distance_m", columns.chain(["angle_deg", "intensity_cd"].map(str::to_owned)));
     let extinctions: Vec<f64> = rates_mm_per_h.iter().map(|rate| extinction_at(*rate)).collect();
     let last_angle = (1.2 * outer).min(180.0);
     for step in 0..=STEPS {
@@ -44,25 +44,19 @@ pub(crate) fn figure(intensity: f64, [inner, outer]: [f64; 2], rates_mm_per_h: &
         let angle = last_angle * fraction;
         let (sin, cos) = math::sin_cos(angle.to_radians());
         let candela = f64::from(light.illuminance(DVec3::new(cos, sin, 0.0)).0[1]);
-        table.rows.push([distance].into_iter().chain(attenuated).chain([angle, candela]).collect());
+        table.push(distance, attenuated.chain([angle, candela]));
     }
     let last = rates_mm_per_h.len();
-    let curve = |(index, rate): (usize, &f64)| Series {
-        label: format!("R = {} mm/h, extinction {} per km", number(*rate), number(rounded(1e3 * extinctions[index]))),
-        color: color(index),
-        style: Style::Line,
-        points: table.points(0, 1 + index),
-    };
-    let mut series: Vec<Series> = rates_mm_per_h.iter().enumerate().map(curve).collect();
+    let mut series = Vec::new();
+    for (index, (rate, extinction)) in rates_mm_per_h.iter().zip(&extinctions).enumerate() {
+        let per_km = number(rounded(1e3 * extinction));
+        let label = format!("R = {} mm/h, extinction {per_km} per km", number(*rate));
+        series.push(Series::curve(label, index, table.points(0, 1 + index)));
+    }
     let slope = table.rows.iter().step_by(STEPS / 6).map(|row| [row[0], intensity / (row[0] * row[0])]).collect();
-    let label = "inverse square, without rain".to_owned();
-    series.push(Series { label, color: color(6), style: Style::Markers, points: slope });
-    let across = vec![Series {
-        label: format!("full up to {}°, none beyond {}°", number(inner), number(outer)),
-        color: color(0),
-        style: Style::Line,
-        points: table.points(last + 1, last + 2),
-    }];
+    series.push(Series::reference("inverse square, without rain", slope));
+    let label = format!("full up to {}°, none beyond {}°", number(inner), number(outer));
+    let across = vec![Series::curve(label, 0, table.points(last + 1, last + 2))];
     let brightest = intensity / (DISTANCES[0] * DISTANCES[0]);
     Ok(Figure {
         title: format!("Beam of {} cd in rain", number(intensity)),

@@ -13,7 +13,7 @@ use crate::args::ColorTexture;
 use super::{
     PlotError,
     csv::rows,
-    figure::{Axis, ColorStrip, Figure, FigureTable, PALETTE, Panel, Plot, Rgb, Series, Style},
+    figure::{Axis, ColorStrip, Figure, FigureTable, Panel, Plot, Rgb, Series},
     texture::FigureTexture,
     ticks,
 };
@@ -109,48 +109,39 @@ fn luminance_plot(table: &FigureTable, x: &Axis) -> Plot {
         x: x.clone(),
         y: Axis::log("Luminance", "cd/m²", [DARKEST, brightest]),
         series: vec![
-            Series { label: "Bansho".to_owned(), color: PALETTE[0], style: Style::Line, points },
-            Series {
-                label: "Planck's law, CIE 1931 observer".to_owned(),
-                color: PALETTE[6],
-                style: Style::Markers,
-                points: reference,
-            },
+            Series::curve("Bansho", 0, points),
+            Series::reference("Planck's law, CIE 1931 observer", reference),
         ],
     }
 }
 
 fn color_plot(table: &FigureTable, x: &Axis) -> Plot {
     let reference = rows::<5>(REFERENCE);
-    let curve = |c: usize| Series {
-        label: RGB[c].0.to_owned(),
-        color: RGB[c].1,
-        style: Style::Line,
+    let mut series = Vec::new();
+    for (c, (label, color)) in RGB.into_iter().enumerate() {
         // Bodies too dark for single precision have no color.
-        points: table.points(0, 1 + c).into_iter().filter(|point| point[1] != 0.0).collect(),
-    };
-    let markers = Series {
-        label: "Planck's law, CIE 1931 observer".to_owned(),
-        color: PALETTE[6],
-        style: Style::Markers,
-        points: (0..3).flat_map(|c| reference.iter().map(move |row| [row[0], row[2 + c]])).collect(),
-    };
+        let points = table.points(0, 1 + c).into_iter().filter(|point| point[1] != 0.0).collect();
+        series.push(Series::curve(label, c, points).colored(color));
+    }
+    let points = (0..3).flat_map(|c| reference.iter().map(move |row| [row[0], row[2 + c]])).collect();
+    series.push(Series::reference("Planck's law, CIE 1931 observer", points));
     let [low, high] = table.bounds(&[1, 2, 3]).unwrap_or([0.0, 1.0]);
     Plot {
         x: x.clone(),
         y: Axis::linear("Linear sRGB of luminance 1", "", ticks::rounded([low, high.min(6.0)], 5)),
-        series: (0..3).map(curve).chain([markers]).collect(),
+        series,
     }
 }
 
 /// Colors as a display shows them at the greatest brightness that it has for each; black below [`DARKEST`].
 fn strip(temperatures: Temperatures) -> Vec<Rgb> {
-    let color = |index: usize| {
+    let mut colors = Vec::with_capacity(STRIP_COLORS);
+    for index in 0..STRIP_COLORS {
         let t = (index as f64 + 0.5) / STRIP_COLORS as f64;
         let light = light(math::lerp(temperatures.from, temperatures.to, t));
-        if light.ln_luminance < math::ln(DARKEST) { [0; 3] } else { display_color(light.acescg) }
-    };
-    (0..STRIP_COLORS).map(color).collect()
+        colors.push(if light.ln_luminance < math::ln(DARKEST) { [0; 3] } else { display_color(light.acescg) });
+    }
+    colors
 }
 
 /// The color of each temperature as a row of texels: linear sRGB without negative values, scaled such that its brightest channel is 1; black
@@ -158,11 +149,11 @@ fn strip(temperatures: Temperatures) -> Vec<Rgb> {
 pub(crate) fn texture(temperatures: Temperatures, encoding: ColorTexture) -> Result<FigureTexture, PlotError> {
     let kelvins = temperatures.checked()?;
     let width = kelvins.len();
-    let color = |kelvin: f64| {
-        let Light { srgb, ln_luminance, .. } = light(kelvin);
-        if ln_luminance < math::ln(DARKEST) { [0.0; 3] } else { full(srgb) }
-    };
-    let colors = kelvins.into_iter().map(color);
+    let lights = kelvins.into_iter().map(light);
+    let colors = lights.map(|Light { srgb, ln_luminance, .. }| match ln_luminance < math::ln(DARKEST) {
+        true => [0.0; 3],
+        false => full(srgb),
+    });
     Ok(match encoding {
         ColorTexture::Srgb => FigureTexture::srgb(width, colors.map(|color| color.map(|value| code(value as f32)))),
         ColorTexture::Linear => FigureTexture::linear_16(width, colors),

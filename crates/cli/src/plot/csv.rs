@@ -23,11 +23,12 @@ pub(crate) fn encode(title: &str, table: &FigureTable) -> String {
 
 /// Numbers of a table that is compiled in: a line of names, then rows of numbers.
 pub(crate) fn rows<const N: usize>(text: &str) -> Vec<[f64; N]> {
-    let row = |line: &str| {
+    let mut rows = Vec::new();
+    for line in text.lines().skip(1) {
         let mut fields = line.split(',').map(|field| field.parse().unwrap_or(f64::NAN));
-        std::array::from_fn(|_| fields.next().unwrap_or(f64::NAN))
-    };
-    text.lines().skip(1).map(row).collect()
+        rows.push(std::array::from_fn(|_| fields.next().unwrap_or(f64::NAN)));
+    }
+    rows
 }
 
 fn quoted(name: &str) -> String {

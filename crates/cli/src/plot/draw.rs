@@ -75,10 +75,14 @@ fn labels_x(figure: &Figure, index: usize) -> bool {
     figure.panels.get(index + 1).is_none_or(|next| next.x() != figure.panels[index].x())
 }
 
+/// Space below a panel, for the labels of its axis or to the next panel.
+fn space_below(figure: &Figure, index: usize) -> f64 {
+    if labels_x(figure, index) { BOTTOM } else { GAP }
+}
+
 fn size(figure: &Figure) -> [f64; 2] {
-    let below = |index: usize| if labels_x(figure, index) { BOTTOM } else { GAP };
     let panels = figure.panels.iter().enumerate();
-    [WIDTH, TOP + panels.map(|(index, panel)| panel_height(figure, panel) + below(index)).sum::<f64>()]
+    [WIDTH, TOP + panels.map(|(index, panel)| panel_height(figure, panel) + space_below(figure, index)).sum::<f64>()]
 }
 
 fn draw(figure: &Figure, canvas: &mut dyn FigureCanvas) {
@@ -99,7 +103,7 @@ fn draw(figure: &Figure, canvas: &mut dyn FigureCanvas) {
             Panel::Plot(plot) => draw_plot(plot, &area, labels_x, canvas),
             Panel::Colors(strip) => draw_strip(strip, &area, labels_x, canvas),
         }
-        top += height + if labels_x { BOTTOM } else { GAP };
+        top += height + space_below(figure, index);
     }
 }
 
@@ -143,63 +147,70 @@ fn fraction(axis: &Axis, value: f64) -> f64 {
     }
 }
 
-/// A page position within an area.
-fn position(plot: &Plot, area: &Area, [x, y]: [f64; 2]) -> [f64; 2] {
-    [
-        math::lerp(area.left, area.right, fraction(&plot.x, x)),
-        math::lerp(area.bottom, area.top, fraction(&plot.y, y).max(-10.0)),
-    ]
+/// Where a number of a horizontal axis is on the page.
+fn page_x(axis: &Axis, area: &Area, value: f64) -> f64 {
+    math::lerp(area.left, area.right, fraction(axis, value))
+}
+
+/// Where a number of a vertical axis is on the page. What is infinitely far below, as 0 on a logarithmic axis, is far below instead, so that the curve that
+/// leads there can be drawn.
+fn page_y(axis: &Axis, area: &Area, value: f64) -> f64 {
+    math::lerp(area.bottom, area.top, fraction(axis, value).max(-10.0))
 }
 
 fn draw_plot(plot: &Plot, area: &Area, labels_x: bool, canvas: &mut dyn FigureCanvas) {
     let rows = if area.bottom - area.top > 200.0 { 7 } else { 5 };
     let (x_ticks, y_ticks) = (ticks::ticks(&plot.x, 8), ticks::ticks(&plot.y, rows));
-    let x_of = |value: f64| math::lerp(area.left, area.right, fraction(&plot.x, value));
-    let y_of = |value: f64| math::lerp(area.bottom, area.top, fraction(&plot.y, value));
     for (value, _) in &x_ticks.major {
-        canvas.line(&[[x_of(*value), area.top], [x_of(*value), area.bottom]], &GRID_LINE);
+        let x = page_x(&plot.x, area, *value);
+        canvas.line(&[[x, area.top], [x, area.bottom]], &GRID_LINE);
     }
     for (value, _) in &y_ticks.major {
-        canvas.line(&[[area.left, y_of(*value)], [area.right, y_of(*value)]], &GRID_LINE);
+        let y = page_y(&plot.y, area, *value);
+        canvas.line(&[[area.left, y], [area.right, y]], &GRID_LINE);
     }
     let mut drawn = Vec::new();
     for series in &plot.series {
-        let points: Vec<[f64; 2]> = series.points.iter().map(|&point| position(plot, area, point)).collect();
-        drawn.extend(draw_series(series, &points, area, canvas));
+        let points = series.points.iter().map(|&[x, y]| [page_x(&plot.x, area, x), page_y(&plot.y, area, y)]);
+        drawn.extend(draw_series(series, &points.collect::<Vec<_>>(), area, canvas));
     }
     draw_frame(area, canvas);
-    draw_x_ticks(&x_ticks, x_of, area, canvas);
+    for (length, value) in sized(&x_ticks) {
+        let x = page_x(&plot.x, area, value);
+        canvas.line(&[[x, area.bottom], [x, area.bottom - length]], &AXIS);
+        canvas.line(&[[x, area.top], [x, area.top + length]], &AXIS);
+    }
     for (length, value) in sized(&y_ticks) {
-        let y = y_of(value);
+        let y = page_y(&plot.y, area, value);
         canvas.line(&[[area.left, y], [area.left + length, y]], &AXIS);
         canvas.line(&[[area.right, y], [area.right - length, y]], &AXIS);
     }
     for (value, label) in &y_ticks.major {
-        let at = [area.left - 7.0, y_of(*value) + 0.5 * CAP_HEIGHT * NUMBER_SIZE];
+        let at = [area.left - 7.0, page_y(&plot.y, area, *value) + 0.5 * CAP_HEIGHT * NUMBER_SIZE];
         canvas.text(label, &number(at, TextAnchor::End));
     }
     if labels_x {
-        draw_x_labels(&plot.x, &x_ticks, x_of, area, canvas);
+        draw_x_labels(&plot.x, &x_ticks, area, canvas);
     }
     draw_y_caption(&plot.y, &y_ticks, area, canvas);
     draw_legend(plot, area, &drawn, canvas);
 }
 
 fn draw_strip(strip: &ColorStrip, area: &Area, labels_x: bool, canvas: &mut dyn FigureCanvas) {
-    let edge = |index: usize| math::lerp(area.left, area.right, index as f64 / strip.colors.len() as f64);
     for (index, &color) in strip.colors.iter().enumerate() {
+        let [left, right] =
+            [index, index + 1].map(|edge| math::lerp(area.left, area.right, edge as f64 / strip.colors.len() as f64));
         // A little overlap, so that nothing shines through between neighbors.
-        let right = (edge(index + 1) + 0.5).min(area.right);
-        canvas.rectangle([[edge(index), area.top], [right, area.bottom]], color, 1.0);
+        canvas.rectangle([[left, area.top], [(right + 0.5).min(area.right), area.bottom]], color, 1.0);
     }
     draw_frame(area, canvas);
     let ticks = ticks::ticks(&strip.x, 8);
-    let x_of = |value: f64| math::lerp(area.left, area.right, fraction(&strip.x, value));
     if labels_x {
         for (value, _) in &ticks.major {
-            canvas.line(&[[x_of(*value), area.bottom], [x_of(*value), area.bottom + 4.0]], &AXIS);
+            let x = page_x(&strip.x, area, *value);
+            canvas.line(&[[x, area.bottom], [x, area.bottom + 4.0]], &AXIS);
         }
-        draw_x_labels(&strip.x, &ticks, x_of, area, canvas);
+        draw_x_labels(&strip.x, &ticks, area, canvas);
     }
 }
 
@@ -213,17 +224,9 @@ fn sized(ticks: &Ticks) -> impl Iterator<Item = (f64, f64)> {
     ticks.major.iter().map(|&(value, _)| (MAJOR_TICK, value)).chain(minor)
 }
 
-fn draw_x_ticks(ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &Area, canvas: &mut dyn FigureCanvas) {
-    for (length, value) in sized(ticks) {
-        let x = x_of(value);
-        canvas.line(&[[x, area.bottom], [x, area.bottom - length]], &AXIS);
-        canvas.line(&[[x, area.top], [x, area.top + length]], &AXIS);
-    }
-}
-
-fn draw_x_labels(axis: &Axis, ticks: &Ticks, x_of: impl Fn(f64) -> f64, area: &Area, canvas: &mut dyn FigureCanvas) {
+fn draw_x_labels(axis: &Axis, ticks: &Ticks, area: &Area, canvas: &mut dyn FigureCanvas) {
     for (value, label) in &ticks.major {
-        canvas.text(label, &number([x_of(*value), area.bottom + 17.0], TextAnchor::Middle));
+        canvas.text(label, &number([page_x(axis, area, *value), area.bottom + 17.0], TextAnchor::Middle));
     }
     let style = TextStyle {
         at: [0.5 * (area.left + area.right), area.bottom + 37.0],
@@ -281,7 +284,7 @@ fn draw_series(series: &Series, points: &[[f64; 2]], area: &Area, canvas: &mut d
     }
     let pieces = clip(&thinned(points), area);
     pieces.iter().for_each(|piece| canvas.line(piece, &stroke));
-    pieces.iter().flat_map(|piece| piece.windows(2)).flat_map(|pair| between(pair[0], pair[1])).collect()
+    pieces.iter().flat_map(|piece| piece.windows(2)).flat_map(|pair| sampled(pair[0], pair[1])).collect()
 }
 
 /// At most about [`CURVE_POINTS`] of the points, the last among them.
@@ -293,12 +296,9 @@ fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 /// Points of a straight line a few pixels apart.
-fn between(from: [f64; 2], to: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+fn sampled(from: [f64; 2], to: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
     let steps = ((to[0] - from[0]).abs().max((to[1] - from[1]).abs()) / 4.0).ceil().max(1.0);
-    (0..steps as usize).map(move |step| {
-        let t = step as f64 / steps;
-        [math::lerp(from[0], to[0], t), math::lerp(from[1], to[1], t)]
-    })
+    (0..steps as usize).map(move |step| between(from, to, step as f64 / steps))
 }
 
 /// The parts of a curve within an area, by Liang and Barsky (1984). It is interrupted where a point is not finite.
@@ -325,6 +325,7 @@ fn clip_segment(from: [f64; 2], to: [f64; 2], area: &Area) -> Option<[[f64; 2]; 
         let change = to[c] - from[c];
         let (a, b) = (low[c] - from[c], high[c] - from[c]);
         if change == 0.0 {
+            // Parallel to this side: inside of it or not, all along.
             if a > 0.0 || b < 0.0 {
                 return None;
             }
@@ -333,8 +334,15 @@ fn clip_segment(from: [f64; 2], to: [f64; 2], area: &Area) -> Option<[[f64; 2]; 
             (enter, leave) = (enter.max(near), leave.min(far));
         }
     }
-    let at = |t: f64| [math::lerp(from[0], to[0], t), math::lerp(from[1], to[1], t)];
-    (enter <= leave).then(|| [if enter == 0.0 { from } else { at(enter) }, if leave == 1.0 { to } else { at(leave) }])
+    // Ends that are inside stay bit for bit, so that `clip` recognizes the end of one segment as the start of the next.
+    let start = if enter == 0.0 { from } else { between(from, to, enter) };
+    let end = if leave == 1.0 { to } else { between(from, to, leave) };
+    (enter <= leave).then_some([start, end])
+}
+
+/// The point of a straight line at the fraction `t` of its length.
+fn between(from: [f64; 2], to: [f64; 2], t: f64) -> [f64; 2] {
+    [math::lerp(from[0], to[0], t), math::lerp(from[1], to[1], t)]
 }
 
 /// Lines of a legend, and their measures.
@@ -356,8 +364,8 @@ fn draw_legend(plot: &Plot, area: &Area, drawn: &[[f64; 2]], canvas: &mut dyn Fi
     let candidates = columns
         .iter()
         .flat_map(|&left| rows.iter().map(move |&top| Area { left, right: left + width, top, bottom: top + height }));
-    let hidden = |area: &Area| drawn.iter().filter(|&&point| area.grown(6.0).contains(point)).count();
-    let Some(place) = candidates.min_by_key(hidden) else { return };
+    let best = candidates.min_by_key(|area| drawn.iter().filter(|&&point| area.grown(6.0).contains(point)).count());
+    let Some(place) = best else { return };
     canvas.rectangle(place.corners(), [255; 3], 0.85);
     canvas.line(&place.outline(), &LineStyle { color: [190; 3], width: 0.7, dash: None });
     for (index, series) in plot.series.iter().enumerate() {

@@ -77,7 +77,6 @@ impl Axis {
     /// A logarithmic axis over whole decades; a short one ends at 1, 2 or 5 times a power of ten.
     pub(crate) fn log(label: &str, unit: &str, range: [f64; 2]) -> Self {
         let ends: &[f64] = if range[1] < 1e3 * range[0] { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let decade = |value: f64| math::pow(10.0, (math::log10(value) + 1e-9).floor());
         let [low, high] = range.map(decade);
         let low = ends.iter().map(|end| end * low).filter(|end| *end <= range[0] * 1.000_001).fold(low, f64::max);
         let above = ends.iter().map(|end| end * high).chain([10.0 * high]);
@@ -94,6 +93,11 @@ impl Axis {
             [false, false] => format!("{} ({factor} {})", self.label, self.unit),
         }
     }
+}
+
+/// The largest power of ten up to `value`, which may lie below it by rounding.
+fn decade(value: f64) -> f64 {
+    math::pow(10.0, (math::log10(value) + 1e-9).floor())
 }
 
 /// How numbers become distances along an axis.
@@ -116,6 +120,28 @@ pub(crate) struct Series {
     pub(crate) style: Style,
     /// (x, y); a curve is interrupted where a number is not finite.
     pub(crate) points: Vec<[f64; 2]>,
+}
+
+impl Series {
+    /// Curve `index` of a plot, in the color of that number.
+    pub(crate) fn curve(label: impl Into<String>, index: usize, points: Vec<[f64; 2]>) -> Self {
+        Self { label: label.into(), color: color(index), style: Style::Line, points }
+    }
+
+    /// Measurements, or numbers of somebody else, which the curves are compared with: gray circles.
+    pub(crate) fn reference(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self { label: label.into(), color: PALETTE[6], style: Style::Markers, points }
+    }
+
+    /// The same curve, dashed.
+    pub(crate) fn dashed(self) -> Self {
+        Self { style: Style::Dashed, ..self }
+    }
+
+    /// The same curve in another color.
+    pub(crate) fn colored(self, color: Rgb) -> Self {
+        Self { color, ..self }
+    }
 }
 
 /// How a series is drawn.
@@ -164,6 +190,16 @@ impl FigureTable {
     /// A table without rows.
     pub(crate) fn new(columns: impl IntoIterator<Item = impl Into<String>>) -> Self {
         Self { columns: columns.into_iter().map(Into::into).collect(), rows: Vec::new() }
+    }
+
+    /// A table without rows: the argument of some functions, then the functions.
+    pub(crate) fn of_functions(argument: &str, functions: impl IntoIterator<Item = String>) -> Self {
+        Self::new([argument.to_owned()].into_iter().chain(functions))
+    }
+
+    /// Adds the row of one argument with the values of the functions.
+    pub(crate) fn push(&mut self, argument: f64, values: impl IntoIterator<Item = f64>) {
+        self.rows.push([argument].into_iter().chain(values).collect());
     }
 
     /// Two columns as points.

@@ -8,7 +8,7 @@ use bansho::{
 };
 
 use super::{
-    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series},
     transfer_curves::flame_sheet,
 };
 
@@ -76,25 +76,22 @@ fn row(parameters: &FlameSheetParameters, s: f64, height: f64) -> Vec<f64> {
 }
 
 fn panels(table: &FigureTable, time: f64, height: f64) -> Vec<Panel> {
-    let plot = |x: &str, y: &str, curves: &[(&str, usize)]| {
-        let series = |(index, (label, column)): (usize, &(&str, usize))| Series {
-            label: (*label).to_owned(),
-            color: color(index),
-            style: Style::Line,
-            points: table.points(0, *column),
-        };
-        Panel::Plot(Plot {
-            x: Axis::linear(x, "", [0.0, 1.0]),
-            y: Axis::linear(y, "", [0.0, 1.05]),
-            series: curves.iter().enumerate().map(series).collect(),
-        })
-    };
     vec![
-        plot("w, u", "Thresholds, eq. (4), figure 2", &[("V(w)", 1), ("H(u)", 2)]),
-        plot("y", "Rise, eq. (9)", &[("w(y)", 3)]),
-        plot("w", "Widths, figure 6 (a)", &[("A(w)", 4), ("A(w) + D(w)", 5)]),
-        plot("x'", "Speed, eq. (11), figure 6 (b)", &[(&format!("K(x', {height})"), 7)]),
-        plot("position in the fringe", "Falloff, figure 6 (c)", &[("F", 6)]),
-        plot("w", "Edges, eq. (15), figure 7", &[(&format!("E(w, {time} s), left"), 8), ("right", 9)]),
+        panel(table, "w, u", "Thresholds, eq. (4), figure 2", &[("V(w)", 1), ("H(u)", 2)]),
+        panel(table, "y", "Rise, eq. (9)", &[("w(y)", 3)]),
+        panel(table, "w", "Widths, figure 6 (a)", &[("A(w)", 4), ("A(w) + D(w)", 5)]),
+        panel(table, "x'", "Speed, eq. (11), figure 6 (b)", &[(&format!("K(x', {height})"), 7)]),
+        panel(table, "position in the fringe", "Falloff, figure 6 (c)", &[("F", 6)]),
+        panel(table, "w", "Edges, eq. (15), figure 7", &[(&format!("E(w, {time} s), left"), 8), ("right", 9)]),
     ]
+}
+
+/// A plot of some columns, each with its label, over the argument from 0 to 1.
+fn panel(table: &FigureTable, x: &str, y: &str, curves: &[(&str, usize)]) -> Panel {
+    let curves = curves.iter().enumerate();
+    Panel::Plot(Plot {
+        x: Axis::linear(x, "", [0.0, 1.0]),
+        y: Axis::linear(y, "", [0.0, 1.05]),
+        series: curves.map(|(index, (label, column))| Series::curve(*label, index, table.points(0, *column))).collect(),
+    })
 }

@@ -7,7 +7,7 @@ use bansho::{
 };
 
 use super::{
-    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series},
     texture::{FigureTexture, signed_code, unsigned_code},
 };
 
@@ -40,18 +40,17 @@ pub(crate) fn figure() -> Figure {
     ]);
     for step in 0..=STEPS {
         let r = step as f64 / STEPS as f64;
-        table.rows.push(vec![r, poly6(r), poly6_gradient(r), line_integral(r, 1.0), line_gradient(r, 1.0)]);
+        table.push(r, [poly6(r), poly6_gradient(r), line_integral(r, 1.0), line_gradient(r, 1.0)]);
     }
     let x = Axis::linear("Distance r/d", "", [0.0, 1.0]);
-    let line = |label: &str, column: usize, index: usize| Series {
-        label: label.to_owned(),
-        color: color(index),
-        style: if index == 0 { Style::Line } else { Style::Dashed },
-        points: table.points(0, column),
-    };
-    let values = vec![line("poly6, W d³: the paper's sprite", 1, 0), line("its line integral, times d²", 3, 1)];
-    let gradients =
-        vec![line("of poly6, W' d⁴: the paper's deflection", 2, 0), line("of its line integral, times d³", 4, 1)];
+    let values = vec![
+        Series::curve("poly6, W d³: the paper's sprite", 0, table.points(0, 1)),
+        Series::curve("its line integral, times d²", 1, table.points(0, 3)).dashed(),
+    ];
+    let gradients = vec![
+        Series::curve("of poly6, W' d⁴: the paper's deflection", 0, table.points(0, 2)),
+        Series::curve("of its line integral, times d³", 1, table.points(0, 4)).dashed(),
+    ];
     Figure {
         title: "Poly6 kernel of support radius d (Inagaki et al., eq. (2), figures 2 and 3)".to_owned(),
         panels: vec![
@@ -64,23 +63,29 @@ pub(crate) fn figure() -> Figure {
 
 /// Centers of texels from the upper left, from -1 to 1: to the right and up.
 fn texel_centers(size: usize) -> impl Iterator<Item = [f64; 2]> {
-    let center = move |index: usize| (2.0 * index as f64 + 1.0) / size as f64 - 1.0;
-    (0..size * size).map(move |index| [center(index % size), -center(index / size)])
+    (0..size * size).map(move |index| {
+        let [column, row] = [index % size, index / size].map(|index| (2.0 * index as f64 + 1.0) / size as f64 - 1.0);
+        [column, -row]
+    })
 }
 
 /// Poly6 over a square of side 2 d, scaled to 1 at the center: figure 2.
 pub(crate) fn density_texture(size: usize) -> FigureTexture {
-    let texel = |[x, y]: [f64; 2]| [unsigned_code(poly6(math::hypot(x, y)) / poly6(0.0)); 3];
-    FigureTexture::linear_8(size, texel_centers(size).map(texel))
+    let values = texel_centers(size).map(|[x, y]| poly6(math::hypot(x, y)) / poly6(0.0));
+    FigureTexture::linear_8(size, values.map(|value| [unsigned_code(value); 3]))
 }
 
 /// Direction in which a particle deflects light, outward, over a square of side 2 d, scaled to 1 where it is largest: figure 3. In the plane
 /// through the particle nothing is deflected along z.
 pub(crate) fn deflection_texture(size: usize) -> FigureTexture {
-    let texel = |[x, y]: [f64; 2]| {
-        let r = math::hypot(x, y);
-        let outward = -poly6_gradient(r) / (steepest_gradient() * r.max(f64::MIN_POSITIVE));
-        [x * outward, y * outward, 0.0].map(signed_code)
-    };
-    FigureTexture::linear_8(size, texel_centers(size).map(texel))
+    let directions = texel_centers(size).map(deflection);
+    FigureTexture::linear_8(size, directions.map(|direction| direction.map(signed_code)))
+}
+
+/// The deflection at (x, y), in support radii from the particle, of length 1 where it is largest.
+fn deflection([x, y]: [f64; 2]) -> [f64; 3] {
+    let r = math::hypot(x, y);
+    // The direction (x, y) / r has no value at the center, where the gradient is 0.
+    let outward = -poly6_gradient(r) / (steepest_gradient() * r.max(f64::MIN_POSITIVE));
+    [x * outward, y * outward, 0.0]
 }

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::{
     PlotError,
-    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, bounds, color, pretty_unit},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, bounds, pretty_unit},
     ticks,
 };
 
@@ -23,6 +23,14 @@ struct Quantity {
     name: String,
     unit: String,
     phenomenon: String,
+}
+
+impl Quantity {
+    /// The name of its column, with the unit.
+    fn column(&self) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
+        format!("{} {}{unit}", self.phenomenon, self.name)
+    }
 }
 
 /// Every number of some metadata files, over the frames.
@@ -45,25 +53,21 @@ pub(crate) fn figure(paths: &[PathBuf]) -> Result<Figure, PlotError> {
         return Err(PlotError::NoNumbers { path: paths.first().cloned().unwrap_or_default() });
     }
     let x = Axis::linear("Frame", "", [*first as f64, if first < last { *last as f64 } else { *first as f64 + 1.0 }]);
-    let column = |quantity: &Quantity| {
-        let unit = if quantity.unit.is_empty() { String::new() } else { format!(" ({})", quantity.unit) };
-        format!("{} {}{unit}", quantity.phenomenon, quantity.name)
-    };
-    let mut table = FigureTable::new(["frame".to_owned()].into_iter().chain(quantities.iter().map(column)));
+    let mut table = FigureTable::of_functions("frame", quantities.iter().map(Quantity::column));
     for (frame, numbers) in &frames {
-        let value = |quantity: &Quantity| numbers.get(quantity).copied().unwrap_or(f64::NAN);
-        table.rows.push([*frame as f64].into_iter().chain(quantities.iter().map(value)).collect());
+        // What a frame does not state is a gap in the curve.
+        table.push(*frame as f64, quantities.iter().map(|quantity| numbers.get(quantity).copied().unwrap_or(f64::NAN)));
     }
     // One plot for each number of all phenomena that report it.
     let mut panels = Vec::new();
     for (start, group) in grouped(&quantities) {
-        let curve = |(index, quantity): (usize, &Quantity)| Series {
-            label: quantity.phenomenon.clone(),
-            color: color(index),
-            style: if table.rows.len() > 1 { Style::Line } else { Style::Markers },
-            points: table.points(0, 1 + start + index),
-        };
-        let series: Vec<Series> = group.iter().enumerate().map(curve).collect();
+        // A line through a single point would be invisible.
+        let style = if table.rows.len() > 1 { Style::Line } else { Style::Markers };
+        let mut series = Vec::new();
+        for (index, quantity) in group.iter().enumerate() {
+            let points = table.points(0, 1 + start + index);
+            series.push(Series { style, ..Series::curve(&quantity.phenomenon, index, points) });
+        }
         let range = bounds(series.iter().flat_map(|series| &series.points).map(|point| point[1]));
         // The name of a single curve stands beside its axis, since it has no legend.
         let label = if let [one] = group { format!("{}: {}", one.phenomenon, one.name) } else { group[0].name.clone() };
@@ -84,12 +88,17 @@ fn grouped(quantities: &[Quantity]) -> Vec<(usize, &[Quantity])> {
     .collect()
 }
 
+/// The frame of a file of metadata, and all numbers of its phenomena.
 fn read(path: &Path) -> Result<(i64, BTreeMap<Quantity, f64>), PlotError> {
-    let fail = |problem: String| PlotError::NotMetadata { path: path.to_path_buf(), problem };
-    let bytes = input::read(path, MOST_BYTES).map_err(|error| fail(error.to_string()))?;
-    let value: Value = serde_json::from_slice(&bytes).map_err(|error| fail(error.to_string()))?;
-    let frame = value["frame"].as_i64().ok_or_else(|| fail("states no `frame`".to_owned()))?;
-    let phenomena = value["phenomena"].as_object().ok_or_else(|| fail("states no `phenomena`".to_owned()))?;
+    numbers(path).map_err(|problem| PlotError::NotMetadata { path: path.to_path_buf(), problem })
+}
+
+/// Does what [`read`] does; the error says what is wrong with the file.
+fn numbers(path: &Path) -> Result<(i64, BTreeMap<Quantity, f64>), String> {
+    let bytes = input::read(path, MOST_BYTES).map_err(|error| error.to_string())?;
+    let value: Value = serde_json::from_slice(&bytes).map_err(|error| error.to_string())?;
+    let frame = value["frame"].as_i64().ok_or("states no `frame`")?;
+    let phenomena = value["phenomena"].as_object().ok_or("states no `phenomena`")?;
     let mut numbers = BTreeMap::new();
     for (phenomenon, stated) in phenomena {
         for (name, number) in stated.as_object().into_iter().flatten() {

@@ -1,7 +1,7 @@
 //! `bansho plot`: figures of what the models compute.
 //!
 //! [`figure`] describes a figure as plain data; [`black_body`], [`kernel`], [`rain`], [`beam`], [`aurora`], [`parameters`], [`transfer_curves`], [`flame_shape`] and
-//! [`metadata`] make one from the library's own functions. [`texture`] and [`deflection`] are pictures without axes. [`draw`] lays a figure out on a
+//! [`metadata`] make one from the library's own functions. [`texture`] has pictures without axes. [`draw`] lays a figure out on a
 //! [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
 
 pub(crate) mod aurora;
@@ -9,7 +9,6 @@ pub(crate) mod beam;
 pub(crate) mod black_body;
 mod canvas;
 pub(crate) mod csv;
-pub(crate) mod deflection;
 pub(crate) mod draw;
 pub(crate) mod figure;
 pub(crate) mod flame_shape;

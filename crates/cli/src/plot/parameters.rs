@@ -15,7 +15,7 @@ use bansho::{
 
 use super::{
     PlotError, did_you_mean,
-    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, bounds, color, pretty_unit},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, bounds, pretty_unit},
     ticks,
 };
 
@@ -42,11 +42,11 @@ struct Stated<'a> {
 impl Stated<'_> {
     /// The path as `--set` takes it.
     fn path(&self) -> String {
-        let step = |step: &Step| match step {
+        let steps = self.steps.iter().map(|step| match step {
             Step::Key(key) => key.clone(),
             Step::Item { index, .. } => index.to_string(),
-        };
-        self.steps.iter().map(step).collect::<Vec<_>>().join(".")
+        });
+        steps.collect::<Vec<_>>().join(".")
     }
 
     /// Whether `path` means this value: list items by index or name, or all of a list.
@@ -135,18 +135,23 @@ fn curves(node: &Node) -> Vec<Curve> {
         _ => InterpolationName::default(),
     };
     let Some(Value::List(keys)) = table.get("keys").map(|node| &node.value) else { return Vec::new() };
-    let key = |key: &Node| match &key.value {
+    let keys: Vec<(f64, Vec<f64>)> = keys.iter().filter_map(time_and_components).collect();
+    let count = keys.iter().map(|(_, values)| values.len()).min().unwrap_or(0);
+    let mut curves = Vec::new();
+    for c in 0..count {
+        let points = keys.iter().map(|(time, values)| [*time, values[c]]).collect();
+        // It cannot fail: the scene was checked with the same curve.
+        curves.extend(Curve::new(points, Interpolation::from(interpolation)));
+    }
+    curves
+}
+
+/// A key, `[time, number]` or `[time, [numbers]]`.
+fn time_and_components(key: &Node) -> Option<(f64, Vec<f64>)> {
+    match &key.value {
         Value::List(pair) => Some((pair.first()?.value.as_number()?, components(&pair.get(1)?.value)?)),
         _ => None,
-    };
-    let keys: Vec<(f64, Vec<f64>)> = keys.iter().filter_map(key).collect();
-    let count = keys.iter().map(|(_, values)| values.len()).min().unwrap_or(0);
-    let curve = |c: usize| {
-        let points = keys.iter().map(|(time, values)| [*time, values[c]]).collect();
-        // The scene was checked with the same curve.
-        Curve::new(points, Interpolation::from(interpolation)).ok()
-    };
-    (0..count).filter_map(curve).collect()
+    }
 }
 
 fn components(value: &Value) -> Option<Vec<f64>> {
@@ -238,16 +243,11 @@ fn parameter_plot(stated: &Stated, x: &Axis, table: &mut FigureTable) -> Plot {
             row.push(curve.eval(row[1]));
         }
         let label = if name.is_empty() { "value".to_owned() } else { name.to_owned() };
-        series.push(Series {
-            label,
-            color: color(c),
-            style: Style::Line,
-            points: drawn(curve, &table.points(1, column)),
-        });
+        series.push(Series::curve(label, c, drawn(curve, &table.points(1, column))));
     }
     let keys: Vec<[f64; 2]> = curves.iter().flat_map(|curve| curve.points().iter().copied()).collect();
     let shown = series.iter().flat_map(|series| &series.points).map(|point| point[1]);
     let range = bounds(shown).unwrap_or([0.0, 1.0]);
-    series.push(Series { label: "keys".to_owned(), color: color(6), style: Style::Markers, points: keys });
+    series.push(Series::reference("keys", keys));
     Plot { x: x.clone(), y: Axis::linear(&path, &pretty_unit(unit), ticks::padded(range)), series }
 }

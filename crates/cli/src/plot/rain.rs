@@ -10,7 +10,7 @@ use bansho::rain::{
 
 use super::{
     csv::{number, rows},
-    figure::{Axis, Figure, FigureTable, Panel, Plot, Series, Style, color},
+    figure::{Axis, Figure, FigureTable, Panel, Plot, Series},
     ticks,
 };
 
@@ -46,27 +46,24 @@ fn add_reference(table: &mut FigureTable, name: String, points: &[[f64; 2]]) {
 
 /// Drop size distributions of Marshall and Palmer (1948), eq. (1), at rain rates in mm/h.
 pub(crate) fn drop_sizes(rates_mm_per_h: &[f64]) -> Figure {
-    let name = |rate: &f64| format!("n_at_{}_mm_per_h_per_m3_mm", number(*rate));
-    let mut table = FigureTable::new(["diameter_mm".to_owned()].into_iter().chain(rates_mm_per_h.iter().map(name)));
+    let names = rates_mm_per_h.iter().map(|rate| format!("n_at_{}_mm_per_h_per_m3_mm", number(*rate)));
+    let mut table = FigureTable::of_functions("diameter_mm", names);
     let distributions: Vec<_> =
         rates_mm_per_h.iter().map(|rate| DropSizeDistribution::marshall_palmer(*rate)).collect();
     for diameter in diameters_mm() {
-        let densities = distributions.iter().map(|distribution| distribution.density(diameter));
-        table.rows.push([diameter].into_iter().chain(densities).collect());
+        table.push(diameter, distributions.iter().map(|distribution| distribution.density(diameter)));
     }
-    let curve = |(index, rate): (usize, &f64)| Series {
-        label: format!("R = {} mm/h", number(*rate)),
-        color: color(index),
-        style: Style::Line,
-        points: table.points(0, 1 + index),
-    };
-    let mut series: Vec<Series> = rates_mm_per_h.iter().enumerate().map(curve).collect();
-    let reference = rows::<3>(MARSHALL_PALMER);
-    let is_shown = |row: &&[f64; 3]| rates_mm_per_h.contains(&row[0]);
-    let points: Vec<_> = reference.iter().filter(is_shown).map(|row| [row[1], row[2]]).collect();
+    let mut series = Vec::new();
+    for (index, rate) in rates_mm_per_h.iter().enumerate() {
+        series.push(Series::curve(format!("R = {} mm/h", number(*rate)), index, table.points(0, 1 + index)));
+    }
+    let reference = rows::<3>(MARSHALL_PALMER).into_iter();
+    let points: Vec<[f64; 2]> = reference
+        .filter(|[rate, ..]| rates_mm_per_h.contains(rate))
+        .map(|[_, diameter, density]| [diameter, density])
+        .collect();
     if !points.is_empty() {
-        let label = "formula at the paper's diameters".to_owned();
-        series.push(Series { label, color: color(6), style: Style::Markers, points });
+        series.push(Series::reference("formula at the paper's diameters", points));
     }
     Figure {
         title: "Drop size distribution of Marshall and Palmer (1948), eq. (1)".to_owned(),
@@ -82,38 +79,27 @@ pub(crate) fn drop_sizes(rates_mm_per_h: &[f64]) -> Figure {
 /// Terminal velocity in still air at 20 degrees Celsius and 1013.25 hPa: both laws, and the measurements.
 pub(crate) fn terminal_velocity() -> Figure {
     let measured: Vec<[f64; 2]> = rows::<2>(GUNN_KINZER);
-    let law = |law| TerminalVelocity { law, air: FallAir::default() };
-    let laws = [law(VelocityLaw::GunnKinzer), law(VelocityLaw::RigidSphere)];
+    let laws = [VelocityLaw::GunnKinzer, VelocityLaw::RigidSphere]
+        .map(|law| TerminalVelocity { law, air: FallAir::default() });
     let mut diameters = diameters_mm();
     diameters.extend(measured.iter().map(|point| point[0]));
     diameters.sort_by(f64::total_cmp);
     diameters.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
     let mut table = FigureTable::new(["diameter_mm", "gunn_kinzer_m_per_s", "rigid_sphere_m_per_s"]);
     for diameter in diameters {
-        table.rows.push(vec![diameter, laws[0].speed(diameter), laws[1].speed(diameter)]);
+        table.push(diameter, laws.iter().map(|law| law.speed(diameter)));
     }
     add_reference(&mut table, "measured_gunn_kinzer_1949_m_per_s".to_owned(), &measured);
     let top = table.bounds(&[1, 2]).map_or(10.0, |[_, high]| high);
-    let line = |label: &str, index: usize, style: Style| Series {
-        label: label.to_owned(),
-        color: color(index),
-        style,
-        points: table.points(0, 1 + index),
-    };
     Figure {
         title: "Terminal velocity of raindrops at 20 °C, 1013 hPa".to_owned(),
         panels: vec![Panel::Plot(Plot {
             x: diameter_axis(),
             y: Axis::linear("Terminal velocity v", "m/s", ticks::rounded([0.0, top], 7)),
             series: vec![
-                line("gunn_kinzer: interpolated measurements", 0, Style::Line),
-                line("rigid_sphere: eqs. (2) to (4)", 1, Style::Dashed),
-                Series {
-                    label: "measured by Gunn and Kinzer (1949)".to_owned(),
-                    color: color(6),
-                    style: Style::Markers,
-                    points: measured,
-                },
+                Series::curve("gunn_kinzer: interpolated measurements", 0, table.points(0, 1)),
+                Series::curve("rigid_sphere: eqs. (2) to (4)", 1, table.points(0, 2)).dashed(),
+                Series::reference("measured by Gunn and Kinzer (1949)", measured),
             ],
         })],
         table,
@@ -123,40 +109,29 @@ pub(crate) fn terminal_velocity() -> Figure {
 /// Opacity on the axis of a streak, D / (v T), at exposure times in s.
 pub(crate) fn streak_opacity(exposure_times_s: &[f64], law: VelocityLaw) -> Figure {
     let velocity = TerminalVelocity { law, air: FallAir::default() };
-    let name = |time: &f64| format!("opacity_at_{}_s", number(*time));
-    let mut table = FigureTable::new(["diameter_mm".to_owned()].into_iter().chain(exposure_times_s.iter().map(name)));
+    let names = exposure_times_s.iter().map(|time| format!("opacity_at_{}_s", number(*time)));
+    let mut table = FigureTable::of_functions("diameter_mm", names);
     // A drop of no diameter has no streak.
     for diameter in diameters_mm().into_iter().filter(|diameter| *diameter >= 0.1) {
         let speed = velocity.speed(diameter);
-        let opacity = |time: &f64| Streak::new(diameter, speed, *time).profile(0.0);
-        table.rows.push([diameter].into_iter().chain(exposure_times_s.iter().map(opacity)).collect());
+        table.push(diameter, exposure_times_s.iter().map(|time| Streak::new(diameter, speed, *time).profile(0.0)));
     }
-    let curve = |(index, time): (usize, &f64)| Series {
-        label: format!("T = {}", exposure(*time)),
-        color: color(index),
-        style: Style::Line,
-        points: table.points(0, 1 + index),
-    };
-    let mut series: Vec<Series> = exposure_times_s.iter().enumerate().map(curve).collect();
+    let mut series = Vec::new();
+    for (index, time) in exposure_times_s.iter().enumerate() {
+        series.push(Series::curve(format!("T = {}", exposure(*time)), index, table.points(0, 1 + index)));
+    }
     if law == VelocityLaw::GunnKinzer {
-        let known = exposure_times_s.iter().enumerate().flat_map(|(index, time)| {
-            let row = move |row: [f64; 3]| ((row[1] / time - 1.0).abs() < 1e-4).then_some((index, [row[0], row[2]]));
-            rows::<3>(STREAK_OPACITY).into_iter().filter_map(row)
-        });
-        let known: Vec<(usize, [f64; 2])> = known.collect();
-        if !known.is_empty() {
-            series.push(Series {
-                label: "D / (v T), Gunn and Kinzer's v".to_owned(),
-                color: color(6),
-                style: Style::Markers,
-                points: known.iter().map(|(_, point)| *point).collect(),
-            });
-        }
-        for (index, time) in exposure_times_s.iter().enumerate() {
-            let points: Vec<_> = known.iter().filter(|(of, _)| *of == index).map(|(_, point)| *point).collect();
+        let mut reference = Vec::new();
+        for time in exposure_times_s {
+            let rows = rows::<3>(STREAK_OPACITY).into_iter().filter(|row| (row[1] / time - 1.0).abs() < 1e-4);
+            let points: Vec<[f64; 2]> = rows.map(|[diameter, _, opacity]| [diameter, opacity]).collect();
             if !points.is_empty() {
                 add_reference(&mut table, format!("reference_at_{}_s", number(*time)), &points);
+                reference.extend(points);
             }
+        }
+        if !reference.is_empty() {
+            series.push(Series::reference("D / (v T), Gunn and Kinzer's v", reference));
         }
     }
     let columns: Vec<usize> = (1..=exposure_times_s.len()).collect();

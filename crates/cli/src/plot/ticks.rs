@@ -36,8 +36,8 @@ pub(super) fn rounded([low, high]: [f64; 2], count: usize) -> [f64; 2] {
     let span = high - low;
     let low = if (-0.01 * span..0.0).contains(&low) { 0.0 } else { low };
     let step = step(span, 2 * count);
-    let whole = |value: f64, round: fn(f64) -> f64, slack: f64| round(value / step + slack) * step;
-    let [low, top] = [whole(low, f64::floor, 1e-9), whole(high, f64::ceil, -1e-9)];
+    // An end that is a multiple but for rounding stays where it is.
+    let [low, top] = [(low / step + 1e-9).floor() * step, (high / step - 1e-9).ceil() * step];
     [low, if top > low { top } else { low + step }]
 }
 
@@ -53,24 +53,31 @@ pub(super) fn padded([low, high]: [f64; 2]) -> [f64; 2] {
 
 fn linear([low, high]: [f64; 2], count: usize) -> Ticks {
     let step = step(high - low, count);
-    let multiples = |step: f64| {
-        let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
-        (first..=last).map(move |index| index as f64 * step)
-    };
     let power = exponent(low.abs().max(high.abs()));
     let scaled = !(-3..6).contains(&power);
     let unit = if scaled { math::pow(10.0, f64::from(power)) } else { 1.0 };
     let decimals = (-exponent(step / unit)).max(0) as usize;
-    let label = |value: f64| match value / unit {
-        zero if zero.abs() < 1e-9 * step / unit => "0".to_owned(),
-        value => signed(&format!("{value:.decimals$}")),
-    };
+    let mut major = Vec::new();
+    for value in multiples(step, [low, high]) {
+        let label = match value / unit {
+            zero if zero.abs() < 1e-9 * step / unit => "0".to_owned(),
+            value => signed(&format!("{value:.decimals$}")),
+        };
+        major.push((value, label));
+    }
+    // Between ticks at every 5 there are four smaller ones, so that these are at whole numbers; between others three.
     let is_five = (step / math::pow(10.0, f64::from(exponent(step))) - 5.0).abs() < 0.5;
     Ticks {
         factor: if scaled { power_of_ten(power) } else { String::new() },
-        major: multiples(step).map(|value| (value, label(value))).collect(),
-        minor: multiples(step / if is_five { 5.0 } else { 4.0 }).collect(),
+        major,
+        minor: multiples(step / if is_five { 5.0 } else { 4.0 }, [low, high]).collect(),
     }
+}
+
+/// The multiples of `step` from `low` to `high`, both included but for rounding.
+fn multiples(step: f64, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+    let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+    (first..=last).map(move |index| index as f64 * step)
 }
 
 /// The power of ten of a number.
@@ -109,8 +116,8 @@ fn signed(number: &str) -> String {
 /// A number in raised digits.
 fn superscript(number: i32) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let raised = |letter: char| letter.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
-    number.to_string().chars().map(raised).collect()
+    let letters = number.to_string();
+    letters.chars().map(|letter| letter.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize])).collect()
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use super::{
     PlotError,
     black_body::{RGB, code, display_color},
     did_you_mean,
-    figure::{Axis, ColorStrip, Figure, FigureTable, Panel, Plot, Rgb, Series, Style, color},
+    figure::{Axis, ColorStrip, Figure, FigureTable, Panel, Plot, Rgb, Series},
     ticks,
 };
 
@@ -73,16 +73,13 @@ pub(crate) fn figure(file: &SceneFile, name: Option<&str>) -> anyhow::Result<Fig
         table.rows.push([&[s, sheet.texture.sharpen.eval(s)][..], &rgb].concat());
     }
     let x = Axis::linear("T₁ of eq. (6), T₂ of eq. (7)", "", [0.0, 1.0]);
-    let curve = |label: &str, color: Rgb, column: usize| Series {
-        label: label.to_owned(),
-        color,
-        style: Style::Line,
-        points: table.points(0, column),
-    };
     let range = table.bounds(&[2, 3, 4]).unwrap_or([0.0, 1.0]);
     let y = if is_display { "R, G, B, eq. (7), sRGB-encoded" } else { "R, G, B, eq. (7), linear sRGB" };
-    let rgb = (0..3).map(|c| curve(RGB[c].0, RGB[c].1, 2 + c)).collect();
-    let sharpen = vec![curve("C(T₁)", color(6), 1)];
+    let mut rgb = Vec::new();
+    for (c, (label, color)) in RGB.into_iter().enumerate() {
+        rgb.push(Series::curve(label, c, table.points(0, 2 + c)).colored(color));
+    }
+    let sharpen = vec![Series::curve("C(T₁)", 6, table.points(0, 1))];
     let panels = vec![
         Panel::Plot(Plot {
             x: x.clone(),

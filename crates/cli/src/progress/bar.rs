@@ -39,14 +39,13 @@ impl Bar {
     pub(super) fn new() -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
         let kept = Arc::new(AtomicU64::new(0));
-        let kept_frames = kept.clone();
-        let write_pace = move |state: &ProgressState, text: &mut dyn Write| {
-            let drawn = state.pos().saturating_sub(kept_frames.load(Ordering::Relaxed));
-            // A failure is ignored: the text is missing from the bar.
-            let _ = text.write_str(&pace(drawn, state.per_sec(), state.eta()));
-        };
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
-            bar.set_style(style.with_key("pace", write_pace));
+            let kept = kept.clone();
+            bar.set_style(style.with_key("pace", move |state: &ProgressState, text: &mut dyn Write| {
+                let drawn = state.pos().saturating_sub(kept.load(Ordering::Relaxed));
+                // A failure is ignored: the text is missing from the bar.
+                let _ = text.write_str(&pace(drawn, state.per_sec(), state.eta()));
+            }));
         }
         Self { bar, kept }
     }

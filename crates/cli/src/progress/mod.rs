@@ -159,7 +159,11 @@ impl JobObserver for ProgressReporter {
     }
 
     fn warning(&self, warning: &Warning) {
-        let warn = || print_message("warning", &flags::warning_message(warning));
-        if let Display::Bar(bar) = &*self.display { bar.suspend(warn) } else { warn() }
+        let message = flags::warning_message(warning);
+        match &*self.display {
+            // Otherwise the line of the bar would be torn.
+            Display::Bar(bar) => bar.suspend(|| print_message("warning", &message)),
+            Display::Json(_) | Display::None => print_message("warning", &message),
+        }
     }
 }

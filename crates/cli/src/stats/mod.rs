@@ -141,8 +141,8 @@ pub(crate) fn cpu_seconds() -> Option<f64> {
     let stat = fs::read_to_string("/proc/self/stat").ok()?;
     // The second field is a name in parentheses. User and system time are the 14th and 15th, in hundredths of a second.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks = |field: usize| fields.get(field - 3)?.parse::<f64>().ok();
-    Some((ticks(14)? + ticks(15)?) / 100.0)
+    let (user, system) = (fields.get(14 - 3)?.parse::<f64>().ok()?, fields.get(15 - 3)?.parse::<f64>().ok()?);
+    Some((user + system) / 100.0)
 }
 
 fn peak_mebibytes() -> Option<u64> {

@@ -72,19 +72,22 @@ pub(super) fn table(times: &StageTimes) -> String {
 
 /// The rows as an array.
 pub(super) fn json(times: &StageTimes) -> Value {
-    let ms = |seconds: [f64; 3]| {
-        let [advance, prepare, draw] = seconds.map(|seconds| 1e3 * seconds);
-        json!({ "advance": advance, "prepare": prepare, "draw": draw })
-    };
-    let row = |row: Row| {
+    let rows = rows(times).into_iter();
+    rows.map(|row| {
         json!({
             "phenomenon": row.phenomenon,
             "mirrored": row.is_mirrored,
-            "first_frame_ms": ms(row.first),
-            "median_ms": ms(row.median),
+            "first_frame_ms": milliseconds(row.first),
+            "median_ms": milliseconds(row.median),
         })
-    };
-    rows(times).into_iter().map(row).collect()
+    })
+    .collect()
+}
+
+/// Times in the order of [`STAGES`], in ms, by the names of the stages.
+fn milliseconds(seconds: [f64; 3]) -> Value {
+    let [advance, prepare, draw] = seconds.map(|seconds| 1e3 * seconds);
+    json!({ "advance": advance, "prepare": prepare, "draw": draw })
 }
 
 /// One row for each phenomenon, then their reflections, then compositing.
@@ -109,8 +112,10 @@ fn first_and_median(numbers: &[f64]) -> [f64; 2] {
     let Some((first, others)) = numbers.split_first() else { return [0.0; 2] };
     let mut sorted = others.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let middle = |index: usize| sorted.get(index).copied().unwrap_or(0.0);
-    [*first, 0.5 * (middle(sorted.len() / 2) + middle(sorted.len().saturating_sub(1) / 2))]
+    // Of an even count the median is the mean of the two in the middle; of an odd one both are the same.
+    let middle = [sorted.len() / 2, sorted.len().saturating_sub(1) / 2];
+    let [upper, lower] = middle.map(|index| sorted.get(index).copied().unwrap_or(0.0));
+    [*first, 0.5 * (upper + lower)]
 }
 
 #[cfg(test)]

@@ -45,13 +45,12 @@ fn only_kind<'a>(root: &Table, kinds: &'a [TableKind]) -> Option<&'a TableKind> 
 fn imply_setting(completed: &mut Table, root: &Table, kind: &TableKind, kinds: &[TableKind]) -> Vec<&'static str> {
     // A test checks that all settings can be parsed.
     let setting = toml::parse(kind.scene_defaults).unwrap_or_default();
-    let states = |key: &str| root.get(key).is_some();
     let (mut implied, mut in_setting) = (Vec::new(), 0);
     for shared in kinds {
         let Some(unless) = shared.shared_role().and_then(|role| role.implied_unless) else { continue };
         let Some(Node { value, .. }) = setting.get(shared.key) else { continue };
         in_setting += 1;
-        if !states(shared.key) && !unless.iter().any(|key| states(key)) {
+        if root.get(shared.key).is_none() && !unless.iter().any(|key| root.get(key).is_some()) {
             completed.push(shared.key, value.clone());
             implied.push(shared.key);
         }
@@ -69,22 +68,22 @@ fn imply_setting(completed: &mut Table, root: &Table, kind: &TableKind, kinds: &
 /// Whether the text states the position or the size of a phenomenon.
 fn states_placement(root: &Table, kind: &TableKind) -> bool {
     let Some(Value::List(items)) = root.get(kind.key).map(|node| &node.value) else { return false };
-    let states = |item: &Node| match &item.value {
+    items.iter().any(|item| match &item.value {
         Value::Table(table) => kind.placement_keys.iter().any(|key| table.get(key).is_some()),
         _ => false,
-    };
-    items.iter().any(states)
+    })
 }
 
 /// Completes a perspective camera without position and target by those of the scene defaults.
 fn imply_camera(completed: &mut Table, root: &Table, setting: &Table) {
-    let states = |key: &str| value_in(root, "camera", key).is_some();
+    let is_placed = ["position", "target"].iter().any(|key| value_in(root, "camera", key).is_some());
     let is_perspective = value_in(root, "camera", "lens").is_none_or(|lens| *lens == Value::Text("perspective".into()));
-    if states("position") || states("target") || !is_perspective {
+    if is_placed || !is_perspective {
         return;
     }
     for key in ["position", "target", "vertical_fov_deg"] {
-        let is_free = key != "vertical_fov_deg" || !states("focal_length_mm");
+        // A focal length states the field of view.
+        let is_free = key != "vertical_fov_deg" || value_in(root, "camera", "focal_length_mm").is_none();
         if let Some(value) = value_in(setting, "camera", key).filter(|_| is_free) {
             imply(completed, "camera", key, value.clone());
         }

@@ -298,30 +298,27 @@ fn check_points(points: &[[f64; 3]], [width, height]: [usize; 2]) -> Result<(), 
 /// Intercept and slope of the line of least squares through points [x, y]; `None` if all have the same x.
 fn least_squares(points: &[[f64; 2]]) -> Option<[f64; 2]> {
     let count = points.len() as f64;
-    let mean = |axis: usize| points.iter().map(|point| point[axis]).sum::<f64>() / count;
-    let (mean_x, mean_y) = (mean(0), mean(1));
+    let [mean_x, mean_y] = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / count);
     let covariance: f64 = points.iter().map(|[x, y]| (x - mean_x) * (y - mean_y)).sum();
     let variance: f64 = points.iter().map(|[x, _]| (x - mean_x) * (x - mean_x)).sum();
     let slope = covariance / variance;
     (variance > 0.0 && slope.is_finite()).then_some([mean_y - slope * mean_x, slope])
 }
 
+/// A fit with its relative deviations at the known points, whose depth values are the first of `values`.
 fn judged(points: &[[f64; 3]], values: &[[f64; 2]], shift: f64, slope: f64) -> DepthFit {
-    let found = |value: f64| {
+    let (mut squares, mut misfits) = (0.0, Vec::new());
+    for (number, ([_, _, meters], [value, _])) in (1..).zip(points.iter().zip(values)) {
         let inverse = shift + slope * value;
-        if inverse > 0.0 { 1.0 / inverse } else { f64::INFINITY }
-    };
-    let deviations = || points.iter().zip(values).map(|([_, _, known], [value, _])| (*known, found(*value)));
-    // What lies beyond infinity deviates by its whole distance.
-    let relative = |(known, found): (f64, f64)| if found.is_finite() { (found - known) / known } else { 1.0 };
-    let squares: f64 = deviations().map(|pair| relative(pair) * relative(pair)).sum();
-    let misfits = (1..).zip(deviations()).filter(|(_, pair)| relative(*pair).abs() > MISFIT);
-    DepthFit {
-        shift,
-        slope,
-        residual: (squares / points.len() as f64).sqrt(),
-        misfits: misfits.map(|(point, (known, found))| (point, known, found)).collect(),
+        let fitted = if inverse > 0.0 { 1.0 / inverse } else { f64::INFINITY };
+        // What lies beyond infinity deviates by its whole distance.
+        let deviation: f64 = if fitted.is_finite() { (fitted - meters) / meters } else { 1.0 };
+        squares += deviation * deviation;
+        if deviation.abs() > MISFIT {
+            misfits.push((number, *meters, fitted));
+        }
     }
+    DepthFit { shift, slope, residual: (squares / points.len() as f64).sqrt(), misfits }
 }
 
 #[cfg(test)]

@@ -160,11 +160,11 @@ impl GroundSamples {
     /// Samples of a depth picture with these values, which belongs to an image of `image_size` pixels.
     fn new(values: &[f32], [width, height]: [usize; 2], image_size: [usize; 2], view: &PlateView, ground: f64) -> Self {
         let step = width.max(height).div_ceil(SAMPLES);
-        let positions = |side: usize| (step.min(side) / 2..side).step_by(step);
+        let [columns, rows] = [width, height].map(|side| (step.min(side) / 2..side).step_by(step));
         let per_value = [image_size[0] as f64 / width as f64, image_size[1] as f64 / height as f64];
         let (mut samples, mut below_horizon) = (Vec::new(), 0);
-        for y in positions(height) {
-            for x in positions(width) {
+        for y in rows {
+            for x in columns.clone() {
                 let position = [(x as f64 + 0.5) * per_value[0], (y as f64 + 0.5) * per_value[1]];
                 let pixel = view.picture_position(position, image_size);
                 let Some(inverse) = view.inverse_ground_depth(ground, pixel) else { continue };
@@ -192,19 +192,19 @@ impl GroundSamples {
     /// The line through the pair of samples with which most others agree.
     fn consensus(&self) -> Option<GroundFit> {
         let count = self.samples.len();
-        let consensus_samples = || self.samples.iter().step_by(count.div_ceil(CONSENSUS_SAMPLES).max(1));
+        let voters: Vec<&Sample> = self.samples.iter().step_by(count.div_ceil(CONSENSUS_SAMPLES).max(1)).collect();
         let mut best: Option<(usize, GroundFit)> = None;
         for pair in 0..PAIRS {
-            // A sequence that fills the plane evenly (Roberts 2018).
-            let at = |step: f64| ((step * pair as f64).fract() * count as f64) as usize;
-            let [a, b] = [at(0.754_877_666_246_692_7), at(0.569_840_290_998_053_2)].map(|index| self.samples[index]);
+            // A sequence that fills the plane evenly: R2 of Roberts (2018), the powers of 1 / 1.3247, the plastic number.
+            let [a, b] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2]
+                .map(|step: f64| self.samples[((step * pair as f64).fract() * count as f64) as usize]);
             let slope = (a.inverse - b.inverse) / (a.value - b.value);
             let is_wide = (a.inverse - b.inverse).abs() >= MIN_PAIR_DIFFERENCE * self.nearest;
             if !(is_wide && slope > 0.0 && slope.is_finite()) {
                 continue;
             }
             let fit = GroundFit { slope, shift: a.inverse - slope * a.value, share: 0.0, residual: 0.0 };
-            let agreeing = consensus_samples().filter(|sample| self.agrees(&fit, sample)).count();
+            let agreeing = voters.iter().filter(|sample| self.agrees(&fit, sample)).count();
             if best.is_none_or(|(most, _)| agreeing > most) {
                 best = Some((agreeing, fit));
             }
@@ -214,29 +214,30 @@ impl GroundSamples {
 
     /// One step of least squares with Tukey's weights; `None` if nothing determines a line that rises.
     fn refined(&self, fit: &GroundFit) -> Option<GroundFit> {
-        let relative = |sample: &Sample| fit.deviation(sample) / self.tolerance(sample);
-        let mut deviations: Vec<f64> =
-            self.samples.iter().map(|sample| relative(sample).abs()).filter(|deviation| *deviation <= 1.0).collect();
+        // In units of the tolerance, which grows toward the camera.
+        let relative: Vec<f64> =
+            self.samples.iter().map(|sample| (fit.deviation(sample) / self.tolerance(sample)).abs()).collect();
+        let mut deviations: Vec<f64> = relative.iter().copied().filter(|deviation| *deviation <= 1.0).collect();
         deviations.sort_by(f64::total_cmp);
         let median = *deviations.get(deviations.len() / 2)?;
         // 1.4826 median: a normal distribution's standard deviation. The floor keeps exact data from dividing by 0.
         let reach = TUKEY_CUTOFF * (1.4826 * median).max(1e-6);
-        let weighted: Vec<(f64, Sample)> = self
-            .samples
-            .iter()
-            .map(|sample| {
-                let ratio = (relative(sample) / reach).abs().min(1.0);
-                ((1.0 - ratio * ratio) * (1.0 - ratio * ratio), *sample)
-            })
-            .collect();
-        let total: f64 = weighted.iter().map(|(weight, _)| weight).sum();
-        let mean =
-            |of: fn(&Sample) -> f64| weighted.iter().map(|(weight, sample)| weight * of(sample)).sum::<f64>() / total;
-        let (value, inverse) = (mean(|sample| sample.value), mean(|sample| sample.inverse));
-        let moment = |of: &dyn Fn(&Sample) -> f64| -> f64 {
-            weighted.iter().map(|(weight, sample)| weight * (sample.value - value) * of(sample)).sum()
-        };
-        let slope = moment(&|sample| sample.inverse - inverse) / moment(&|sample| sample.value - value);
+        let weights: Vec<f64> = relative.iter().map(|deviation| tukey_biweight(deviation / reach)).collect();
+        let (mut total, mut value, mut inverse) = (0.0, 0.0, 0.0);
+        for (weight, sample) in weights.iter().zip(&self.samples) {
+            total += weight;
+            value += weight * sample.value;
+            inverse += weight * sample.inverse;
+        }
+        // The weighted means, through which the line of least squares passes.
+        let (value, inverse) = (value / total, inverse / total);
+        let (mut covariance, mut variance) = (0.0, 0.0);
+        for (weight, sample) in weights.iter().zip(&self.samples) {
+            let weighted = weight * (sample.value - value);
+            covariance += weighted * (sample.inverse - inverse);
+            variance += weighted * (sample.value - value);
+        }
+        let slope = covariance / variance;
         (slope > 0.0 && slope.is_finite()).then_some(GroundFit { slope, shift: inverse - slope * value, ..*fit })
     }
 
@@ -245,18 +246,26 @@ impl GroundSamples {
         let agreeing: Vec<&Sample> = self.samples.iter().filter(|sample| self.agrees(fit, sample)).collect();
         let count = agreeing.len().max(1) as f64;
         let mean = agreeing.iter().map(|sample| sample.inverse).sum::<f64>() / count;
-        let sum = |of: &dyn Fn(&Sample) -> f64| agreeing.iter().map(|sample| of(sample) * of(sample)).sum::<f64>();
-        let explained = 1.0 - sum(&|sample| fit.deviation(sample)) / sum(&|sample| sample.inverse - mean);
-        // Relative deviation of the distance: (1 / found - 1 / known) / (1 / known). Noise may make the inverse distance found negative;
-        // that counts as a deviation of 100 %.
-        let relative = |sample: &Sample| {
-            let found = sample.inverse + fit.deviation(sample);
-            if found > 0.0 { (sample.inverse / found - 1.0).clamp(-1.0, 1.0) } else { 1.0 }
-        };
-        let (share, residual) =
-            (agreeing.len() as f64 / self.below_horizon.max(1) as f64, (sum(&relative) / count).sqrt());
-        (GroundFit { share, residual, ..*fit }, explained)
+        let (mut unexplained, mut total, mut relative) = (0.0, 0.0, 0.0);
+        for sample in &agreeing {
+            let deviation = fit.deviation(sample);
+            unexplained += deviation * deviation;
+            total += (sample.inverse - mean) * (sample.inverse - mean);
+            // Relative deviation of the distance: (1 / fitted - 1 / actual) / (1 / actual). Noise may make the fitted inverse distance negative;
+            // that counts as a deviation of 100 %.
+            let fitted = sample.inverse + deviation;
+            let of_distance: f64 = if fitted > 0.0 { (sample.inverse / fitted - 1.0).clamp(-1.0, 1.0) } else { 1.0 };
+            relative += of_distance * of_distance;
+        }
+        let share = agreeing.len() as f64 / self.below_horizon.max(1) as f64;
+        (GroundFit { share, residual: (relative / count).sqrt(), ..*fit }, 1.0 - unexplained / total)
     }
+}
+
+/// Tukey's biweight (Beaton & Tukey 1974) of a deviation in units of its cutoff, beyond which a sample has no weight.
+fn tukey_biweight(deviation: f64) -> f64 {
+    let ratio = deviation.abs().min(1.0);
+    (1.0 - ratio * ratio) * (1.0 - ratio * ratio)
 }
 
 /// Fits `1 / distance = shift + slope value` to the ground at `height`, where a depth shows it. The depth has `values` in rows of its `size`, and belongs to an
@@ -272,18 +281,17 @@ pub(super) fn fit(
     if samples.below_horizon < MIN_SAMPLES {
         return Err(GroundFitError::NotSeen { height });
     }
-    let too_few = |share| GroundFitError::TooFew { share, height };
     if samples.samples.len() < MIN_SAMPLES {
-        return Err(too_few(0.0));
+        return Err(GroundFitError::TooFew { share: 0.0, height });
     }
-    let mut found = samples.consensus().ok_or(GroundFitError::Flat { height })?;
+    let mut fit = samples.consensus().ok_or(GroundFitError::Flat { height })?;
     for _ in 0..REFINEMENT_STEPS {
-        let Some(refined) = samples.refined(&found) else { break };
-        found = refined;
+        let Some(refined) = samples.refined(&fit) else { break };
+        fit = refined;
     }
-    let (fit, explained) = samples.evaluate(&found);
+    let (fit, explained) = samples.evaluate(&fit);
     if fit.share < MIN_AGREEING_FRACTION {
-        return Err(too_few(fit.share));
+        return Err(GroundFitError::TooFew { share: fit.share, height });
     }
     if explained < MIN_EXPLAINED_VARIANCE {
         return Err(GroundFitError::Flat { height });

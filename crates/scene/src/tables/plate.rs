@@ -210,11 +210,11 @@ impl PlateParameters {
         }
         let mut depth = PlateDepth { source, size: depth_size, scale };
         if !self.depth_known.is_empty() {
-            let value_at = |position| depth.value_at(position, size(image));
-            let found = depth::fit(&self.depth_known, self.depth_kind, size(image), value_at);
-            let found = found.map_err(|error| conflict("depth_known", error))?;
-            depth.scale = found.scale();
-            remarks.push(PlateRemark::DepthFit(found));
+            let size = size(image);
+            let fit = depth::fit(&self.depth_known, self.depth_kind, size, |position| depth.value_at(position, size));
+            let fit = fit.map_err(|error| conflict("depth_known", error))?;
+            depth.scale = fit.scale();
+            remarks.push(PlateRemark::DepthFit(fit));
         }
         if let Some(height) = view.ground_height.filter(|_| self.fits_ground()) {
             let found = ground_fit::fit(depth.values(), depth.size, size(image), view, height);

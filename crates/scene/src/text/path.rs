@@ -89,9 +89,12 @@ pub(crate) fn nearest_span(root: &Table, path: &str) -> Option<Span> {
 
 /// Whether the scene `root` states the value at a dotted path.
 pub(crate) fn is_stated(root: &Table, path: &str) -> bool {
-    let then = |path: ValuePath, segment: &str| match segment.parse() {
-        Ok(index) => path.index(index),
-        Err(_) => path.key(segment),
-    };
-    path.split('.').fold(ValuePath::root(), then).find(root).is_some()
+    let mut value_path = ValuePath::root();
+    for segment in path.split('.') {
+        value_path = match segment.parse() {
+            Ok(index) => value_path.index(index),
+            Err(_) => value_path.key(segment),
+        };
+    }
+    value_path.find(root).is_some()
 }

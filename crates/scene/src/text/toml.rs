@@ -51,12 +51,14 @@ fn too_deep_key(text: &str) -> Option<Span> {
 }
 
 fn table(source: &dyn TableLike) -> Table {
-    let entry = |(key, item): (&str, &Item)| {
+    let mut entries = Vec::new();
+    for (key, item) in source.iter() {
         let key_span = source.key(key).and_then(toml_edit::Key::span).unwrap_or(0..0);
-        let node = node(item, &key_span)?;
-        Some(Entry { key: key.to_owned(), key_span, node })
-    };
-    Table { entries: source.iter().filter_map(entry).collect() }
+        if let Some(node) = node(item, &key_span) {
+            entries.push(Entry { key: key.to_owned(), key_span, node });
+        }
+    }
+    Table { entries }
 }
 
 /// A list of tables has no useful span of its own, and gets that of its key.
@@ -68,11 +70,11 @@ fn node(item: &Item, key_span: &Span) -> Option<Node> {
             Some(Node { value: Value::Table(table(source)), span: source.span().unwrap_or(key_span.clone()) })
         }
         Item::ArrayOfTables(tables) => {
-            let item = |source: &toml_edit::Table| Node {
+            let items = tables.iter().map(|source| Node {
                 value: Value::Table(table(source)),
                 span: source.span().unwrap_or(key_span.clone()),
-            };
-            Some(Node { value: Value::List(tables.iter().map(item).collect()), span: key_span.clone() })
+            });
+            Some(Node { value: Value::List(items.collect()), span: key_span.clone() })
         }
     }
 }

@@ -31,12 +31,13 @@ impl Layout {
     /// The layout in `store`; the default where there is none.
     pub(super) fn read(store: SettingsStore) -> Self {
         let text = store.read(NAME).unwrap_or_default();
-        let pair = |line: &str| {
-            let (key, value) = line.rsplit_once(' ')?;
-            let value = value.parse().ok().filter(|value: &f32| value.is_finite() && *value >= 0.0)?;
-            Some((key.to_owned(), value))
-        };
-        let values: BTreeMap<String, f32> = text.lines().filter_map(pair).collect();
+        let mut values = BTreeMap::new();
+        for (key, value) in text.lines().filter_map(|line| line.rsplit_once(' ')) {
+            // A file that was edited by hand must not make panels that cannot be seen.
+            if let Some(value) = value.parse().ok().filter(|value: &f32| value.is_finite() && *value >= 0.0) {
+                values.insert(key.to_owned(), value);
+            }
+        }
         Self { store, stored: values.clone(), values }
     }
 

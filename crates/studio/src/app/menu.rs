@@ -50,13 +50,12 @@ impl Studio {
     }
 
     fn edit_menu_ui(&mut self, ui: &mut Ui) {
-        let named = |verb: &str, label: Option<&str>| label.map_or(verb.to_owned(), |label| format!("{verb} {label}"));
         let document = &mut self.session.document;
-        let undo = named("Undo", document.undo_label());
+        let undo = document.undo_label().map_or("Undo".to_owned(), |label| format!("Undo {label}"));
         if ui.add_enabled(document.undo_label().is_some(), egui::Button::new(undo)).clicked() {
             document.undo();
         }
-        let redo = named("Redo", document.redo_label());
+        let redo = document.redo_label().map_or("Redo".to_owned(), |label| format!("Redo {label}"));
         if ui.add_enabled(document.redo_label().is_some(), egui::Button::new(redo)).clicked() {
             document.redo();
         }
@@ -102,19 +101,15 @@ impl Studio {
         if self.files.unsaved.recovered.is_empty() {
             return;
         }
-        let name = |recovered: &RecoveredWork| match recovered.origin.as_str() {
-            "" => "a scene never saved".to_owned(),
-            origin => origin.to_owned(),
-        };
         ui.menu_button("Recover", |ui| {
             for recovered in self.files.unsaved.recovered.clone() {
-                if ui.button(name(&recovered)).clicked() {
+                if ui.button(name_of(&recovered)).clicked() {
                     self.files.recover(&mut self.session, recovered);
                 }
             }
             ui.separator();
             for recovered in self.files.unsaved.recovered.clone() {
-                if ui.button(format!("Not wanted: {}", name(&recovered))).clicked() {
+                if ui.button(format!("Not wanted: {}", name_of(&recovered))).clicked() {
                     self.files.unsaved.discard(&recovered);
                 }
             }
@@ -122,4 +117,9 @@ impl Studio {
         .response
         .on_hover_text("Unsaved work of a studio that did not end well");
     }
+}
+
+/// What the menu calls unsaved work: the file that it is of.
+fn name_of(recovered: &RecoveredWork) -> &str {
+    if recovered.origin.is_empty() { "a scene never saved" } else { &recovered.origin }
 }

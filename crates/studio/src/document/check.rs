@@ -76,8 +76,9 @@ impl Checker {
         let operations = draft_operations(&parse_values(text).ok()?);
         let draft = operation::apply(text, &operations).ok().filter(|_| !operations.is_empty())?;
         let full = self.check(name, text, assets);
-        let plan_draft = |full: PlannedScene| {
+        Some(full.and_then(|full| {
             let compiled = build(name, &draft, assets, &mut self.last_draft)?;
+            // With the exposure of the full scene, so that fewer particles do not look brighter.
             let plan = Plan::with_exposure_and_loop_start(
                 compiled.scene().clone(),
                 &PlanOptions::default(),
@@ -86,8 +87,7 @@ impl Checker {
             );
             let plan = plan.map(Arc::new).map_err(|error| error_without_span(name, text, error.to_string()))?;
             Ok(PlannedScene { compiled, plan })
-        };
-        Some(full.and_then(plan_draft))
+        }))
     }
 }
 

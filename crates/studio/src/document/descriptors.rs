@@ -24,8 +24,10 @@ pub(crate) fn table_descriptor(key: &str) -> Option<&'static TableDescriptor> {
 pub(crate) fn descriptor(path: &ValuePath) -> Option<&'static Descriptor> {
     let keys: Vec<&str> = path.segments().iter().filter_map(key).collect();
     let [root, inner @ .., last] = keys.as_slice() else { return None };
-    let within = |table: &'static TableDescriptor, key: &&str| inner_table(&parameter(table, key)?.kind);
-    let table = inner.iter().try_fold(table_descriptor(root)?, within)?;
+    let mut table = table_descriptor(root)?;
+    for key in inner {
+        table = inner_table(&parameter(table, key)?.kind)?;
+    }
     parameter(table, last)
 }
 

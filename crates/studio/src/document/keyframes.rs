@@ -51,18 +51,24 @@ pub(crate) fn evaluate_at(value: &Value, time: f64) -> Option<Value> {
     }
     let keyframes = keyframes(value);
     let interpolation = interpolation(value);
-    let number = |component: Option<usize>| {
-        let point = |key: &Keyframe| Some([key.time_s, self::component(key.value, component)?]);
-        let points: Vec<[f64; 2]> = keyframes.iter().map(point).collect::<Option<_>>()?;
-        Some(Curve::new(points, interpolation).ok()?.eval(time))
-    };
     match keyframes.first()?.value {
         Value::List(items) => {
-            let components: Vec<f64> = (0..items.len()).map(|index| number(Some(index))).collect::<Option<_>>()?;
-            Some(Value::numbers(components))
+            let components = (0..items.len()).map(|index| number_at(&keyframes, Some(index), interpolation, time));
+            Some(Value::numbers(components.collect::<Option<Vec<f64>>>()?))
         }
-        _ => number(None).map(Value::Number),
+        _ => number_at(&keyframes, None, interpolation, time).map(Value::Number),
     }
+}
+
+/// The number that `keyframes` have at `time`, s: one component of a vector, or the value itself.
+fn number_at(
+    keyframes: &[Keyframe<'_>],
+    component: Option<usize>,
+    interpolation: Interpolation,
+    time: f64,
+) -> Option<f64> {
+    let points = keyframes.iter().map(|key| Some([key.time_s, self::component(key.value, component)?]));
+    Some(Curve::new(points.collect::<Option<_>>()?, interpolation).ok()?.eval(time))
 }
 
 /// The vector at `path` of the scene `root` at `time`, s; `None` where the scene does not state it.

@@ -75,13 +75,10 @@ fn describe(id: PhenomenonId, table: &Table) -> PhenomenonEntry {
 
 /// A name that none of `entries` has: `wanted`, or `wanted` with a number.
 fn free_name(wanted: &str, entries: &[PhenomenonEntry]) -> String {
-    let taken = |name: &str| entries.iter().any(|other| other.name == name);
-    if !taken(wanted) {
-        return wanted.to_owned();
-    }
-    // One more candidate than there are phenomena, so that one is free.
+    // More candidates than there are phenomena, so that one is free.
     let numbered = (2..entries.len() + 3).map(|number| format!("{wanted} {number}"));
-    numbered.into_iter().find(|name| !taken(name)).unwrap_or_default()
+    let mut candidates = [wanted.to_owned()].into_iter().chain(numbered);
+    candidates.find(|name| entries.iter().all(|other| other.name != *name)).unwrap_or_default()
 }
 
 /// The operations of the scene panel.
@@ -121,8 +118,13 @@ pub mod operations {
     pub fn solo(document: &Document, chosen: &PhenomenonEntry) -> Vec<Operation> {
         let all = document.phenomena();
         let alone = all.iter().all(|each| each.enabled == (each == chosen));
-        let wanted = |each: &PhenomenonEntry| alone || each == chosen;
-        let change = all.iter().filter(|each| each.enabled != wanted(each));
-        change.map(|each| set_enabled(each, wanted(each))).collect()
+        let mut operations = Vec::new();
+        for entry in &all {
+            let enabled = alone || entry == chosen;
+            if entry.enabled != enabled {
+                operations.push(set_enabled(entry, enabled));
+            }
+        }
+        operations
     }
 }

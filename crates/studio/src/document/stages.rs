@@ -38,20 +38,21 @@ pub fn names(kind: &str) -> Vec<&'static str> {
     let Some((Kind::Choice(choices), default)) = parameter.map(|own| (&own.kind, &own.default)) else {
         return Vec::new();
     };
-    let is_default = |name: &str| matches!(default, Some(Value::Text(default)) if default == name);
-    choices.iter().map(|choice| choice.name).filter(|name| !is_default(name)).collect()
+    let names = choices.iter().map(|choice| choice.name);
+    names.filter(|name| !matches!(default, Some(Value::Text(default)) if default == name)).collect()
 }
 
 /// Plans of the stages of `phenomenon` in the scene `text`; `None` where the scene has errors or no such phenomenon.
 pub fn plans(name: &str, text: &str, assets: &Arc<dyn Assets>, phenomenon: PhenomenonId) -> Option<Vec<PlannedScene>> {
     let root = parse_values(text).ok()?;
-    let plan = |stage: &str| {
+    let mut plans = Vec::new();
+    for stage in names(phenomenon.kind) {
         let scene = stage_scene(name, &stage_text(text, &root, phenomenon, stage)?, phenomenon)?;
         let compiled = Arc::new(CompiledScene::build(Arc::new(scene), assets.clone(), None).ok()?);
         let plan = Plan::new(&compiled, &PlanOptions { size: Some(SIZE), ..PlanOptions::default() }).ok()?;
-        Some(PlannedScene { compiled, plan: Arc::new(plan) })
-    };
-    names(phenomenon.kind).into_iter().map(plan).collect()
+        plans.push(PlannedScene { compiled, plan: Arc::new(plan) });
+    }
+    Some(plans)
 }
 
 /// The scene `text` with `phenomenon` at the origin, once, at `stage`.

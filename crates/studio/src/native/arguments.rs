@@ -42,12 +42,11 @@ impl Arguments {
                 _ => rest.push(argument),
             }
         }
-        let text = |argument: &OsString| argument.to_string_lossy().into_owned();
         let mode = match rest.as_slice() {
             [] => Mode::Scene(None),
-            [option] if text(option) == "--help" => Mode::Help,
-            [option, ..] if text(option).starts_with("--") => {
-                return Err(format!("error: {} means nothing here\n{USAGE}", text(option)));
+            [option] if option == "--help" => Mode::Help,
+            [option, ..] if option.to_string_lossy().starts_with("--") => {
+                return Err(format!("error: {} means nothing here\n{USAGE}", option.to_string_lossy()));
             }
             [scene] => Mode::Scene(Some(scene.into())),
             _ => return Err(USAGE.to_owned()),

@@ -88,9 +88,13 @@ fn assets(folder: &Path) -> Arc<dyn Assets> {
 
 /// The folder for settings in the user's data directory.
 fn home() -> Option<PathBuf> {
-    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    let base = variable("XDG_DATA_HOME")
-        .or_else(|| variable("APPDATA"))
-        .or_else(|| Some(variable("HOME")?.join(".local/share")))?;
+    let base = folder_of_variable("XDG_DATA_HOME")
+        .or_else(|| folder_of_variable("APPDATA"))
+        .or_else(|| Some(folder_of_variable("HOME")?.join(".local/share")))?;
     Some(base.join("bansho-studio"))
+}
+
+/// The folder that an environment variable names; an empty one names none.
+fn folder_of_variable(name: &str) -> Option<PathBuf> {
+    std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from)
 }

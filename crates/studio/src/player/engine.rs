@@ -72,6 +72,13 @@ struct OpenShot {
     size: [usize; 2],
 }
 
+impl OpenShot {
+    /// Whether this is the shot of `scene`, whose plan every check makes anew.
+    fn is_of(&self, scene: &PlannedScene) -> bool {
+        Arc::ptr_eq(&self.scene.plan, &scene.plan)
+    }
+}
+
 impl Engine {
     /// Serves `request` and reports to `emit`. Stops when `observer` cancels; another call then continues.
     ///
@@ -85,10 +92,10 @@ impl Engine {
     ) -> Result<(), RequestError> {
         let draft = request.draft && !request.exact && !request.full_quality;
         let FrameRequest { name, text, assets, .. } = request;
-        let same = |last: &Checked| {
+        let is_checked = self.checked.as_ref().is_some_and(|last| {
             (last.revision, last.draft) == (request.revision, draft) && Arc::ptr_eq(&last.assets, assets)
-        };
-        if !self.checked.as_ref().is_some_and(same) {
+        });
+        if !is_checked {
             let drafted = if draft { self.checker.check_draft(name, text, assets) } else { None };
             let is_draft = drafted.is_some();
             let outcome = drafted.unwrap_or_else(|| self.checker.check(name, text, assets));
@@ -204,12 +211,12 @@ impl StageShots {
         }
         // A text with errors has no plans; the last pictures stay.
         let plans = stages::plans(&request.name, &request.text, &request.assets, phenomenon).unwrap_or_default();
-        let open = |scene: PlannedScene| OpenShot {
+        let shots = plans.into_iter().map(|scene| OpenShot {
             shot: Shot::open(scene.compiled.clone(), scene.plan.clone()),
             size: scene.plan.size(),
             scene,
-        };
-        self.shots = plans.into_iter().map(open).collect();
+        });
+        self.shots = shots.collect();
         self.source = Some((scene.clone(), phenomenon));
     }
 }
@@ -221,15 +228,20 @@ fn open_or_replan<'a>(
     size: [usize; 2],
     exact: bool,
 ) -> &'a mut OpenShot {
-    let is_same_scene = |opened: &OpenShot| Arc::ptr_eq(&opened.scene.plan, &scene.plan);
-    let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && is_same_scene(opened)));
-    let (compiled, plan) = (scene.compiled.clone(), || Arc::new(scene.plan.at_size(size)));
+    // A shot that went on from another scene is not that of this one, so that it does not do where exact frames are wanted.
+    let usable = slot.take().filter(|opened| !exact || (opened.shot.is_exact() && opened.is_of(scene)));
     let opened = match usable {
-        None => OpenShot { shot: Shot::open(compiled, plan()), scene: scene.clone(), size },
-        Some(opened) if is_same_scene(&opened) && opened.size == size => opened,
-        Some(mut opened) => {
-            opened.shot.replan(compiled, plan());
-            OpenShot { scene: scene.clone(), size, ..opened }
+        Some(opened) if opened.is_of(scene) && opened.size == size => opened,
+        usable => {
+            let (compiled, plan) = (scene.compiled.clone(), Arc::new(scene.plan.at_size(size)));
+            let shot = match usable {
+                None => Shot::open(compiled, plan),
+                Some(mut opened) => {
+                    opened.shot.replan(compiled, plan);
+                    opened.shot
+                }
+            };
+            OpenShot { shot, scene: scene.clone(), size }
         }
     };
     slot.insert(opened)
@@ -237,8 +249,8 @@ fn open_or_replan<'a>(
 
 /// The largest size with the aspect ratio of `size` that fits `within`; never larger than `size`.
 fn fit_within(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
-    let ratio = |axis: usize| within[axis] as f64 / size[axis] as f64;
-    let scale = ratio(0).min(ratio(1)).min(1.0);
+    let [across, down] = [0, 1].map(|axis| within[axis] as f64 / size[axis] as f64);
+    let scale = across.min(down).min(1.0);
     size.map(|side| ((side as f64 * scale).round() as usize).max(1))
 }
 

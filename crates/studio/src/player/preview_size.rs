@@ -47,17 +47,21 @@ pub struct FrameTiming {
 impl CostModel {
     /// The model updated by a picture of `pixels` that took `draw_s`.
     fn updated(previous: Option<Self>, pixels: f64, draw_s: f64) -> Self {
-        let with = |fixed_s: f64, per_pixel_s: f64| Self { fixed_s, per_pixel_s, last_pixels: pixels, last_s: draw_s };
-        let Some(Self { fixed_s, per_pixel_s, last_pixels, last_s }) = previous else {
-            return with(0.0, draw_s / pixels);
+        let (fixed_s, per_pixel_s) = match previous {
+            None => (0.0, draw_s / pixels),
+            Some(last) if last.last_pixels == pixels => {
+                // The load of the machine or the content of the scene changed.
+                let factor = draw_s / last.seconds(pixels).max(f64::MIN_POSITIVE);
+                (last.fixed_s * factor, last.per_pixel_s * factor)
+            }
+            Some(last) => {
+                // The line through the last two pictures, whose ends are not negative.
+                let slope = (last.last_s - draw_s) / (last.last_pixels - pixels);
+                let per_pixel_s = slope.clamp(0.0, draw_s / pixels);
+                (draw_s - per_pixel_s * pixels, per_pixel_s)
+            }
         };
-        if last_pixels == pixels {
-            // The load of the machine or the content of the scene changed.
-            let factor = draw_s / (fixed_s + per_pixel_s * pixels).max(f64::MIN_POSITIVE);
-            return with(fixed_s * factor, per_pixel_s * factor);
-        }
-        let per_pixel_s = ((last_s - draw_s) / (last_pixels - pixels)).clamp(0.0, draw_s / pixels);
-        with(draw_s - per_pixel_s * pixels, per_pixel_s)
+        Self { fixed_s, per_pixel_s, last_pixels: pixels, last_s: draw_s }
     }
 
     /// The predicted time to draw `pixels`, s.
@@ -78,19 +82,19 @@ impl PreviewScale {
         let cost = CostModel::updated(self.model, pixels, timing.draw_s);
         self.model = Some(cost);
         let current = self.scale();
-        let seconds = |step: usize| {
-            let ratio = SCALES[step] / current;
+        let seconds = SCALES.map(|scale| {
+            let ratio = scale / current;
             timing.advance_s + cost.seconds(pixels * ratio * ratio)
-        };
-        let worthwhile = |step: usize, headroom: f64| {
-            let smallest = seconds(SCALES.len() - 1);
-            seconds(step)
-                <= (headroom * target_s).max(if smallest > target_s { WORTHWHILE_FACTOR * smallest } else { 0.0 })
-        };
-        if !worthwhile(self.step, 1.0) {
-            self.step = (self.step + 1..SCALES.len()).find(|&step| worthwhile(step, 1.0)).unwrap_or(SCALES.len() - 1);
+        });
+        let last = SCALES.len() - 1;
+        // Where even the smallest picture is too slow, a larger one that takes little longer is better.
+        let least_limit = if seconds[last] > target_s { WORTHWHILE_FACTOR * seconds[last] } else { 0.0 };
+        if seconds[self.step] > target_s.max(least_limit) {
+            self.step = (self.step + 1..=last).find(|&step| seconds[step] <= target_s.max(least_limit)).unwrap_or(last);
         } else {
-            self.step = (0..self.step).find(|&step| worthwhile(step, HEADROOM)).unwrap_or(self.step);
+            // With headroom, so that the size does not change to and fro.
+            let limit = (HEADROOM * target_s).max(least_limit);
+            self.step = (0..self.step).find(|&step| seconds[step] <= limit).unwrap_or(self.step);
         }
     }
 }

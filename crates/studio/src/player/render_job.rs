@@ -88,15 +88,14 @@ impl RenderJob {
             wake: Mutex::new(Box::new(wake)),
         });
         let watched = progress.clone();
-        let work = move || {
+        let worker = std::thread::Builder::new().name("render".into()).spawn(move || {
             let result = job.prepare().and_then(|prepared| prepared.run(watched.as_ref()));
             watched.wake();
             result.map(|summary| summary.first_file).map_err(|error| match error {
                 JobError::Cancelled => "stopped; whole frames stay, and rendering the shot goes on from there".into(),
                 error => error.to_string(),
             })
-        };
-        let worker = std::thread::Builder::new().name("render".into()).spawn(work)?;
+        })?;
         Ok(Self { progress, worker: Some(worker) })
     }
 

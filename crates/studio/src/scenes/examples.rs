@@ -117,8 +117,14 @@ impl Assets for BundledAssets {
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
-        let buffer = |name: &str, _: u64| self.require(name).map(<[u8]>::to_vec).map_err(|error| error.problem);
-        let mesh = decode_mesh(self.require(path)?, extension(path), &buffer, MemoryLimit::default());
+        let bytes = self.require(path)?;
+        let mesh = decode_mesh(
+            bytes,
+            extension(path),
+            // Buffers in files of their own; the limit of their size is for files from elsewhere.
+            &|name, _| self.require(name).map(<[u8]>::to_vec).map_err(|error| error.problem),
+            MemoryLimit::default(),
+        );
         mesh.map(Arc::new).map_err(|problem| error(path, problem))
     }
 

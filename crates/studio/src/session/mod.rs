@@ -225,16 +225,16 @@ impl Session {
 
     /// Sets several values in one undo step.
     pub fn set_all(&mut self, label: &str, values: impl IntoIterator<Item = (ValuePath, Value)>) {
-        let is_keyed =
-            |path: &ValuePath| path.find(self.document.values()).is_some_and(|node| keyframes::is_keyed(&node.value));
-        let operation = |(path, value): (ValuePath, Value)| {
-            if is_keyed(&path) || (self.recording && keyframes::animatable(&path)) {
+        let mut operations = Vec::new();
+        for (path, value) in values {
+            let node = path.find(self.document.values());
+            let is_keyed = node.is_some_and(|node| keyframes::is_keyed(&node.value));
+            operations.push(if is_keyed || (self.recording && keyframes::animatable(&path)) {
                 self.keyframe_operation(&path, value)
             } else {
                 Operation::Set { path, value }
-            }
-        };
-        let operations: Vec<Operation> = values.into_iter().map(operation).collect();
+            });
+        }
         self.edit_keeping_view(label, operations);
     }
 
@@ -329,11 +329,11 @@ impl Session {
             draft: self.draft,
             stages: self.stages.filter(|_| !interactive || self.is_quick()),
         };
-        // While interactive, a frame is not drawn again only because its size changed.
-        let same = |last: LastRequest| {
+        let is_same = self.last_request.is_some_and(|last| {
+            // While interactive, a frame is not drawn again only because its size changed.
             last == LastRequest { within: if interactive { last.within } else { next.within }, ..next }
-        };
-        if self.last_request.is_some_and(same) || self.has_panicked() {
+        });
+        if is_same || self.has_panicked() {
             return;
         }
         self.last_request = Some(next);

@@ -63,8 +63,7 @@ impl SettingsStore {
         let count = storage.length().unwrap_or_default();
         let keys = (0..count).filter_map(|index| storage.key(index).ok()?);
         let names = keys.filter_map(|key_name| Some(key_name.strip_prefix(&key(""))?.to_owned()));
-        let has_prefix = |name: &String| name.split(' ').next() == Some(prefix);
-        let mut names: Vec<String> = names.filter(has_prefix).collect();
+        let mut names: Vec<String> = names.filter(|name| name.split(' ').next() == Some(prefix)).collect();
         names.sort();
         names
     }

@@ -24,7 +24,7 @@ bansho_base::choice! {
 }
 
 /// Pixels between the frames of a contact sheet.
-pub(crate) const GUTTER: usize = 2;
+pub(super) const GUTTER: usize = 2;
 /// Color between frames and where the last row is not full: a gray that differs visibly from black.
 const FILL: [u8; 4] = [38, 38, 38, u8::MAX];
 /// Side of the squares of the checkerboard, pixels.
@@ -49,7 +49,7 @@ pub(crate) fn tile(
 ///
 /// # Errors
 /// The tiles differ in size or format.
-pub(crate) fn compose(tiles: &[DisplayImage], sheet: &SheetLayout) -> Result<DisplayImage, SheetError> {
+pub fn compose_contact_sheet(tiles: &[DisplayImage], sheet: &SheetLayout) -> Result<DisplayImage, SheetError> {
     tile_display(tiles, sheet.columns, sheet.gutter, FILL)
 }
 

@@ -111,7 +111,7 @@ impl PreparedJob {
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
         draw_frames(&mut shot, &self.frames, &self.snapshots, &collector, observer)?;
         let _stage = StageGuard::begin(observer, Stage::Write);
-        let picture = contact_sheet::compose(&collector.into_tiles(), sheet)?;
+        let picture = contact_sheet::compose_contact_sheet(&collector.into_tiles(), sheet)?;
         let fingerprint = self.contact_sheet_fingerprint();
         sink.write(FrameSlot { index: 0, number: self.frames[0] }, FinishedPicture::Display(&picture, &fingerprint))?;
         Ok(sink.finish()?)

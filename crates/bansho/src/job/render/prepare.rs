@@ -7,6 +7,8 @@ use std::{
 
 use bansho_base::{
     color::{AlphaConvention, View},
+    frame::{DisplayImage, Frame},
+    host::observer::Observer,
     phenomenon::Remark,
 };
 use bansho_media::{
@@ -16,6 +18,7 @@ use bansho_media::{
     },
     format::OutputKind,
     imageops::sprite_sheet::SheetLayout,
+    output::sink::Sink,
 };
 use bansho_render::{CompiledScene, Plan, PlanOptions, display::BitDepth};
 use bansho_scene::{Positions, SceneOptions, picture};
@@ -83,6 +86,35 @@ impl PreparedJob {
     /// Which existing files may be overwritten.
     pub fn overwrite_policy(&self) -> &OverwritePolicy {
         &self.format.overwrite
+    }
+
+    /// Whether every pixel of the pictures is opaque, as over an opaque plate.
+    pub fn is_opaque(&self) -> bool {
+        self.compiled.has_opaque_plate()
+    }
+
+    /// Opens the files of `pattern` for `count` pictures of `size` pixels, one after the other, in the format and under the policy of this job: for what is
+    /// made of its finished frames, such as a film.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn open_sink(&self, pattern: OutputPattern, count: usize, size: [usize; 2]) -> Result<Sink, JobError> {
+        let format = Format { pattern, ..self.format.clone() };
+        format.open(&self.plan, self.is_opaque(), count, size, 1)
+    }
+
+    /// The display pixels of `frame` by the view of the job.
+    pub fn to_display(&self, frame: &Frame, observer: &dyn Observer) -> DisplayImage {
+        self.format.to_display(frame, observer)
+    }
+
+    /// The layout of a contact sheet of up to `count` frames of the job, which is nearest to a square.
+    ///
+    /// # Errors
+    /// The sheet would be too large.
+    pub fn contact_sheet_layout(&self, count: usize) -> Result<SheetLayout, JobError> {
+        let (window, count) = (self.plan.window(), count.min(self.frames.len()));
+        Ok(sheet::nearly_square_layout(count, [window.width, window.height], contact_sheet::GUTTER)?)
     }
 
     /// What the user should know before the job begins.
@@ -310,7 +342,7 @@ impl Job {
 ///
 /// # Errors
 /// The view `raw` in a format that only has colors for display.
-pub(crate) fn check_view(view: View, kind: OutputKind, path: &Path) -> Result<(), OptionError> {
+pub fn check_view(view: View, kind: OutputKind, path: &Path) -> Result<(), OptionError> {
     if view != View::RAW || kind.takes_linear_acescg() {
         return Ok(());
     }

@@ -47,7 +47,8 @@ impl PreparedJob {
         blake3::hash(fingerprints.as_flattened()).to_hex().to_string()
     }
 
-    pub(crate) fn expected_fingerprint(&self, number: i64) -> [u8; 32] {
+    /// The fingerprint in the file of frame `number`, if it is the frame of this job.
+    pub fn expected_fingerprint(&self, number: i64) -> [u8; 32] {
         self.format.fingerprint(self.plan.frame_fingerprint(number, self.compiled.assets().as_ref()))
     }
 

@@ -135,8 +135,7 @@ pub(super) fn encoded_alpha_codes<C: DisplayCode>(light: [f32; 3], alpha: f32, p
     let quotient = C::MAX_CODE / code as f32;
     let scale = if code > 0 { quotient } else { 0.0 };
     // At most the largest code, since `code` is at least as large as each component.
-    let color = |component: u32| round_to_code(component as f32 * scale);
-    [color(r), color(g), color(b), code]
+    [round_to_code(r as f32 * scale), round_to_code(g as f32 * scale), round_to_code(b as f32 * scale), code]
 }
 
 /// Codes of a pixel without a plate behind it, for programs that blend sRGB-encoded values, `out = color + (1 - A) background`.

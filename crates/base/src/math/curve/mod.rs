@@ -62,15 +62,15 @@ impl Curve {
             Interpolation::Monotone => monotone_slopes(&points),
             Interpolation::Linear | Interpolation::Step => Vec::new(),
         };
-        let segment = |(index, pair): (usize, &[[f64; 2]])| match interpolation {
-            Interpolation::Linear => Segment::linear(pair[0], pair[1]),
-            Interpolation::Step => Segment::level(pair[0], pair[1]),
-            Interpolation::Monotone => Segment::cubic(pair[0], pair[1], slopes[index], slopes[index + 1]),
-        };
-        let segments: Vec<Segment> = points.windows(2).enumerate().map(segment).collect();
-        let mut integrals = vec![0.0];
-        for segment in &segments {
-            integrals.push(integrals[integrals.len() - 1] + segment.integral(1.0));
+        let (mut segments, mut integrals) = (Vec::new(), vec![0.0]);
+        for (index, pair) in points.windows(2).enumerate() {
+            let segment = match interpolation {
+                Interpolation::Linear => Segment::linear(pair[0], pair[1]),
+                Interpolation::Step => Segment::level(pair[0], pair[1]),
+                Interpolation::Monotone => Segment::cubic(pair[0], pair[1], slopes[index], slopes[index + 1]),
+            };
+            integrals.push(integrals[index] + segment.integral(1.0));
+            segments.push(segment);
         }
         Ok(Self { points, segments, integrals, interpolation })
     }

@@ -60,11 +60,15 @@ pub(super) fn monotone_slopes(points: &[[f64; 2]]) -> Vec<f64> {
         0 => vec![0.0; points.len()],
         1 => vec![secants[0]; 2],
         _ => {
-            let inside = |i: usize| inner_slope([intervals[i - 1], intervals[i]], [secants[i - 1], secants[i]]);
-            let first = end_slope([intervals[0], intervals[1]], [secants[0], secants[1]]);
-            let last =
-                end_slope([intervals[count - 1], intervals[count - 2]], [secants[count - 1], secants[count - 2]]);
-            std::iter::once(first).chain((1..count).map(inside)).chain(std::iter::once(last)).collect()
+            let mut slopes = vec![end_slope([intervals[0], intervals[1]], [secants[0], secants[1]])];
+            for (intervals, secants) in intervals.windows(2).zip(secants.windows(2)) {
+                slopes.push(inner_slope([intervals[0], intervals[1]], [secants[0], secants[1]]));
+            }
+            slopes.push(end_slope(
+                [intervals[count - 1], intervals[count - 2]],
+                [secants[count - 1], secants[count - 2]],
+            ));
+            slopes
         }
     }
 }

@@ -38,10 +38,11 @@ impl ElevationProfile {
             sum[3] += weight;
         }
         let seen: Vec<usize> = (0..BANDS).filter(|band| sums[*band][3] > 0.0).collect();
-        let nearest = |band: usize| seen.iter().min_by_key(|other| other.abs_diff(band));
         let mut bands = [[0.0; 3]; BANDS];
         for (band, radiance) in bands.iter_mut().enumerate() {
-            let [red, green, blue, weight] = sums[*nearest(band)?];
+            // Elevations that are not in the picture have the light of the nearest one that is.
+            let nearest = seen.iter().min_by_key(|other| other.abs_diff(band))?;
+            let [red, green, blue, weight] = sums[*nearest];
             *radiance = [red, green, blue].map(|sum| (sum / weight) as f32);
         }
         Some(Self::new(bands))
@@ -60,8 +61,10 @@ impl ElevationProfile {
     /// The same light, scaled by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
-        let scaled = |color: [f32; 3]| color.map(|value| value * factor);
-        Self { bands: self.bands.map(scaled), horizontal: scaled(self.horizontal) }
+        Self {
+            bands: self.bands.map(|band| band.map(|value| value * factor)),
+            horizontal: self.horizontal.map(|value| value * factor),
+        }
     }
 
     /// Radiance from directions with this sine of the elevation.

@@ -183,12 +183,9 @@ impl Night {
         // Twilight: blue overhead, brighter and yellow low above the sun.
         let low = math::exp(-elevation.max(0.0) / TWILIGHT_ARCH);
         let blue = blackbody_light(10_000.0, self.twilight);
-        let single = |color: DVec3| color.to_array().map(|value| value as f32);
-        Almucantar {
-            uniform: single(uniform + blue),
-            glow: single(blackbody_light(3200.0, self.twilight * 9.0 * low * low)),
-            blue: single(blue * (2.0 * low)),
-        }
+        let glow = blackbody_light(3200.0, self.twilight * 9.0 * low * low);
+        let [uniform, glow, blue] = [uniform + blue, glow, blue * (2.0 * low)].map(|color| color.as_vec3().to_array());
+        Almucantar { uniform, glow, blue }
     }
 }
 

@@ -63,8 +63,7 @@ impl Wind {
         let key = Key::new(seed, "wind");
         let words = key.words(0, 0, Purpose::named("gusts"));
         let period = loop_s.map_or(0, |seconds| loop_cells(seconds, parameters.gust_period_s));
-        let component = |index: usize| Noise::new(words[index], FRACTAL, [0, 0, 0, period]).ok();
-        let gusts = match [component(0), component(1), component(2)] {
+        let gusts = match [0, 1, 2].map(|component| Noise::new(words[component], FRACTAL, [0, 0, 0, period]).ok()) {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
             _ => None,
         };

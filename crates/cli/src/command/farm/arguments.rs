@@ -1,11 +1,9 @@
 //! The options of `bansho render` among the arguments of another command, as text that tasks repeat.
 
-use std::{
-    ffi::{OsStr, OsString},
-    iter,
-};
+use std::{ffi::OsString, iter};
 
-use bansho::{farm::FarmError, job::Job};
+use bansho::job::Job;
+use bansho_farm::FarmError;
 use clap::{ArgMatches, Args, CommandFactory, Parser, parser::ValueSource};
 
 use crate::{
@@ -55,12 +53,15 @@ pub(super) fn of_render(arguments: impl IntoIterator<Item = OsString>, path: &[&
     Ok(options.into_iter().chain(iter::once("--".to_owned())).chain(positional).collect())
 }
 
+/// The values of one argument, as they were given.
 fn values(matches: &ArgMatches, id: &str) -> Result<Vec<String>, FarmError> {
-    let text = |value: &OsStr| match value.to_str() {
-        Some(text) => Ok(text.to_owned()),
-        None => Err(FarmError::ControlCharacters { path: value.to_string_lossy().into_owned() }),
-    };
-    matches.get_raw(id).into_iter().flatten().map(text).collect()
+    let mut values = Vec::new();
+    for value in matches.get_raw(id).into_iter().flatten() {
+        let text = value.to_str();
+        let text = text.ok_or_else(|| FarmError::ControlCharacters { path: value.to_string_lossy().into_owned() })?;
+        values.push(text.to_owned());
+    }
+    Ok(values)
 }
 
 /// The job of `bansho render` with `arguments`.

@@ -4,9 +4,9 @@ use std::{io, path::Path, time::Instant};
 
 use bansho::{
     Observer, Stage, StagePart,
-    farm::journal::{Journal, JournalEvent},
     job::{FrameDone, JobObserver, JobStarted, Warning},
 };
+use bansho_farm::journal::{Journal, JournalEvent};
 
 use crate::{output::print_message, progress::ProgressReporter, stats};
 

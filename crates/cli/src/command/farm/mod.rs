@@ -1,21 +1,20 @@
 //! `bansho farm`
 
 mod arguments;
-mod chunks;
-mod finish;
 mod journal;
 mod openjd;
-mod queue;
 mod slurm;
 mod status;
 mod task;
+mod template_steps;
 
 use std::{
     collections::hash_map::RandomState,
     hash::{BuildHasher, Hasher},
 };
 
-use bansho::{farm::FarmError, job::FlipbookSummary};
+use bansho::job::FlipbookSummary;
+use bansho_farm::FarmError;
 
 use crate::{
     args::{FarmArgs, FarmCommand},
@@ -28,18 +27,19 @@ pub(crate) fn run(args: &FarmArgs) -> anyhow::Result<()> {
         FarmCommand::Slurm(args) => slurm::run(args),
         FarmCommand::Status(args) => status::run(args),
         FarmCommand::Openjd(args) => openjd::run(args),
-        FarmCommand::Finish(args) => finish::run(args),
-        FarmCommand::Snapshots(args) => chunks::snapshots(args),
-        FarmCommand::Tile(args) => chunks::tile(args),
-        FarmCommand::Check(args) => chunks::check(args),
+        FarmCommand::Finish(args) => template_steps::finish(args),
+        FarmCommand::Snapshots(args) => template_steps::snapshots(args),
+        FarmCommand::Tile(args) => template_steps::tile(args),
+        FarmCommand::Check(args) => template_steps::check(args),
         FarmCommand::Task(args) => task::run(args),
     }
 }
 
 /// A random word.
 fn random_token() -> String {
-    let word = || RandomState::new().build_hasher().finish();
-    format!("{:016x}{:016x}", word(), word())
+    // Each state has keys of its own, the first ones from the system.
+    let [first, second] = [(); 2].map(|()| RandomState::new().build_hasher().finish());
+    format!("{first:016x}{second:016x}")
 }
 
 /// What is reported of a flipbook.

@@ -5,13 +5,13 @@ use std::path::{self, Path};
 use bansho::{
     Unobserved,
     base::host::printable::printable,
-    farm::{
-        FarmFolder, film, machine,
-        openjd::{self, TemplateOptions},
-        task::{self, sequence_name},
-    },
     job::{Job, frames},
     media::files::{atomic, naming, provenance::PROGRAM},
+};
+use bansho_farm::{
+    FarmFolder, machine,
+    openjd::{self, TemplateOptions},
+    task::{self, sequence_name},
 };
 
 use super::{arguments, random_token};
@@ -30,7 +30,7 @@ pub(crate) fn run(args: &OpenjdArgs) -> anyhow::Result<()> {
     let anywhere = Job { overwrite: true, ..job.clone() };
     let folder = FarmFolder::beside(Path::new(&name));
     let memory_bytes = task::tile_job(&anywhere, &folder, args.tiles, 0)?.prepare()?.memory_bytes();
-    let flipbook = film::check(&products, &anywhere, Path::new("out"))?;
+    let flipbook = products.check(&anywhere, Path::new("out"))?;
     let template = openjd::template(&TemplateOptions {
         name: job.scene.stem,
         scene: relative_scene(args)?,

@@ -3,7 +3,7 @@
 use std::{
     env, fs, io,
     path::{self, Path, PathBuf},
-    process::{Command, Stdio},
+    process::{Command, Output, Stdio},
     thread,
     time::Instant,
 };
@@ -14,25 +14,22 @@ use bansho::{
         host::{plural::counted, printable::printable},
         math::simd::set_vector_level,
     },
-    farm::{
-        FarmError, FarmFolder, FarmPlan,
-        chunks::{self, ChunkGrid, ChunkRequest, ShotCosts},
-        film, machine,
-        plan::FarmPlanOptions,
-        probe::{self, ProbeObserver},
-        products::Products,
-        slurm::{self, SlurmOptions},
-        space, status, task,
-    },
     job::{Job, PreparedJob},
-    media::files::overwrite_policy::OverwritePolicy,
+    media::files::{input, overwrite_policy::OverwritePolicy},
+};
+use bansho_farm::{
+    FarmError, FarmFolder, FarmPlan,
+    chunks::{self, ChunkGrid, ChunkRequest},
+    costs::{ProbeObserver, ShotCosts, check_space, probe_frames},
+    machine,
+    plan::FarmPlanOptions,
+    products::Products,
+    slurm::{self, Queue, SlurmOptions},
+    status::{self, FrameCounts},
+    task,
 };
 
-use super::{
-    arguments,
-    queue::{self, slurm_output},
-    random_token, run_in_pool,
-};
+use super::{arguments, random_token, run_in_pool};
 use crate::{
     args::{ChunkLength, SlurmArgs},
     exit::{ReportedError, UsageError},
@@ -88,6 +85,29 @@ fn shown(path: &Path) -> String {
     printable(&path.display().to_string()).into_owned()
 }
 
+/// Largest list of jobs that is read, bytes.
+const JOBS_BYTES: u64 = 64 << 10;
+
+/// A program of Slurm with its output.
+fn slurm_output(program: &str, arguments: &[&str]) -> io::Result<Output> {
+    Command::new(program).args(arguments).stdin(Stdio::null()).output()
+}
+
+/// The names and numbers of the jobs that were submitted last, a job a line; `None` where none were.
+fn submitted_jobs(folder: &FarmFolder) -> Option<String> {
+    let text = input::read(&folder.jobs(), JOBS_BYTES).ok()?;
+    Some(String::from_utf8_lossy(&text).into_owned())
+}
+
+/// What Slurm does with the jobs of a plan; `None` where none were submitted, or this machine cannot ask.
+pub(super) fn queue(folder: &FarmFolder) -> Option<Queue> {
+    let submitted = submitted_jobs(folder)?;
+    // All jobs rather than these: the shot may be another user's, and Slurm refuses to list a job that it has forgotten.
+    let format = format!("--format={}", Queue::SLURM_FORMAT);
+    let output = slurm_output("squeue", &["--noheader", "--array", &format]).ok()?;
+    output.status.success().then(|| Queue::of_slurm(&submitted, &String::from_utf8_lossy(&output.stdout)))
+}
+
 /// Checks that `sbatch` is there and takes the partition and all other options, before anything is drawn. What it says against them is passed on.
 fn check_slurm(args: &SlurmArgs) -> anyhow::Result<()> {
     let partition = args.partition.iter().map(|partition| format!("--partition={partition}"));
@@ -110,7 +130,7 @@ fn check_slurm(args: &SlurmArgs) -> anyhow::Result<()> {
 
 /// Refuses to plan again while jobs of the last plan are queued or running: they would find another plan than they were submitted for.
 fn check_no_active_jobs(folder: &FarmFolder, is_needed: bool) -> anyhow::Result<()> {
-    let Some(text) = queue::submitted_jobs(folder) else { return Ok(()) };
+    let Some(text) = submitted_jobs(folder) else { return Ok(()) };
     let submitted: Vec<&str> = text.lines().filter_map(|line| line.split_whitespace().nth(1)).collect();
     let queued = match slurm_output("squeue", &["--me", "--noheader", "--format=%F"]) {
         Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).into_owned(),
@@ -135,13 +155,16 @@ fn check_no_active_jobs(folder: &FarmFolder, is_needed: bool) -> anyhow::Result<
 
 /// The largest number of tasks of an array.
 fn max_tasks(args: &SlurmArgs) -> usize {
-    let of_cluster = || {
-        let output = slurm_output("scontrol", &["show", "config"]).ok().filter(|output| output.status.success())?;
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        let line = text.lines().find_map(|line| line.trim_start().strip_prefix("MaxArraySize"))?;
-        line.trim_start_matches([' ', '=']).trim().parse().ok()
-    };
-    args.max_array_size.map(|size| size as usize).or_else(of_cluster).unwrap_or(MAX_ARRAY_SIZE).max(1)
+    let stated = args.max_array_size.map(|size| size as usize);
+    stated.or_else(max_array_size_of_cluster).unwrap_or(MAX_ARRAY_SIZE).max(1)
+}
+
+/// The largest array that the cluster takes; `None` where it does not say.
+fn max_array_size_of_cluster() -> Option<usize> {
+    let output = slurm_output("scontrol", &["show", "config"]).ok().filter(|output| output.status.success())?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let line = text.lines().find_map(|line| line.trim_start().strip_prefix("MaxArraySize"))?;
+    line.trim_start_matches([' ', '=']).trim().parse().ok()
 }
 
 /// Runs `submit.sh`, whose words are those of `sbatch`.
@@ -176,7 +199,7 @@ impl Planning<'_> {
         let tiled = task::tile_job(&self.job, &self.folder, self.args.tiles, self.request().tiles / 2)?;
         let prepared = tiled.prepare()?;
         self.folder.check_files(prepared.overwrite_policy())?;
-        let flipbook = film::check(&self.products, &self.job, &self.current)?;
+        let flipbook = self.products.check(&self.job, &self.current)?;
         let memory_bytes = prepared.memory_bytes();
         let finish_memory_bytes = flipbook.map_or(0.0, |flipbook| flipbook.memory_bytes()).max(memory_bytes);
         let earlier = self.earlier_plan(&prepared);
@@ -214,15 +237,17 @@ impl Planning<'_> {
     /// The plan that this one continues: of the same picture, so that its costs and chunks are those of this one.
     fn earlier_plan(&self, prepared: &PreparedJob) -> Option<FarmPlan> {
         let plan = self.folder.read_plan().ok()?;
+        if plan.arguments != self.arguments || plan.tiles != self.args.tiles || plan.folder != self.current {
+            return None;
+        }
         // The same options with a changed scene may cost anything.
-        let is_same_scene = || Some(prepared.shot_digest(plan.grid().ok()?.chunk(0)) == *plan.digests.first()?);
-        let is_same = plan.arguments == self.arguments && plan.tiles == self.args.tiles && plan.folder == self.current;
-        (is_same && is_same_scene() == Some(true)).then_some(plan)
+        let first_digest = prepared.shot_digest(plan.grid().ok()?.chunk(0));
+        (plan.digests.first() == Some(&first_digest)).then_some(plan)
     }
 
     /// Draws a few frames.
     fn probe(&self, job: &Job, prepared: &PreparedJob, reporter: &ProgressReporter) -> Result<ShotCosts, FarmError> {
-        let frames = probe::frames(prepared.frames(), prepared.is_stepped());
+        let frames = probe_frames(prepared.frames(), prepared.is_stepped());
         let snapshots = prepared.is_stepped().then(|| self.folder.snapshots());
         let every = prepared.is_stepped().then_some(i64::MAX as u64);
         // Not resumed: what exists already would not be measured.
@@ -238,10 +263,9 @@ impl Planning<'_> {
         let observer = ProbeObserver::new(reporter, &clock);
         let drawn = job.prepare()?;
         drawn.run(&observer)?;
-        let bytes = |path: PathBuf| fs::metadata(path).map_or(0, |file| file.len());
-        let largest = frames.iter().map(|&number| bytes(drawn.output().path(number))).max().unwrap_or(0);
+        let largest = frames.iter().map(|&number| file_bytes(&drawn.output().path(number))).max().unwrap_or(0);
         let first = prepared.plan().frames().start;
-        let snapshot_bytes = snapshots.map_or(0, |folder| bytes(folder.join(format!("state.{first}.bansho"))));
+        let snapshot_bytes = snapshots.map_or(0, |folder| file_bytes(&folder.join(format!("state.{first}.bansho"))));
         Ok(ShotCosts { frame_bytes: largest, snapshot_bytes, ..observer.costs(&frames).unwrap_or_default() })
     }
 
@@ -254,9 +278,9 @@ impl Planning<'_> {
         policy: &OverwritePolicy,
     ) -> Result<Planned, FarmError> {
         let states = status::task_states(&self.job, &self.folder, plan)?;
-        let missing = |task: &usize| status::FrameCounts::of(&states[*task]).unfinished();
-        let tasks: Vec<usize> = (0..states.len()).filter(|task| missing(task) > 0).collect();
-        let frames: usize = tasks.iter().map(missing).sum();
+        let missing: Vec<usize> = states.iter().map(|states| FrameCounts::of(states).unfinished()).collect();
+        let tasks: Vec<usize> = (0..missing.len()).filter(|&task| missing[task] > 0).collect();
+        let frames: usize = missing.iter().sum();
         let chunks = tasks.iter().map(|task| task / plan.tile_count());
         let states = self.folder.snapshots();
         let last_snapshot = if plan.snapshots { task::last_missing_snapshot(&states, grid, chunks) } else { None };
@@ -265,8 +289,8 @@ impl Planning<'_> {
         if !is_complete {
             // Before anything may fail, so that nothing is measured twice.
             self.folder.write_plan(plan, policy)?;
-            let required = space::required_bytes(&plan.costs, frames as u64, snapshots);
-            space::check(self.folder.root(), required, available_bytes(self.folder.root()))?;
+            let required = plan.costs.required_bytes(frames as u64, snapshots);
+            check_space(self.folder.root(), required, available_bytes(self.folder.root()))?;
             let options = self.slurm_options(memory_bytes)?;
             for script in slurm::scripts(plan, &self.folder, &tasks, last_snapshot, &options)? {
                 self.folder.write_script(&script, policy)?;
@@ -278,24 +302,33 @@ impl Planning<'_> {
 
     /// Whether the last job of an equal plan has made everything.
     fn is_finished(&self, plan: &FarmPlan) -> Result<bool, FarmError> {
-        let is_equal = |earlier: &FarmPlan| (&earlier.digests, &earlier.products) == (&plan.digests, &plan.products);
-        let earlier = self.folder.read_plan().ok().filter(is_equal);
-        Ok(status::status(&self.job, &self.folder, earlier.as_ref().unwrap_or(plan), None)?.is_complete())
+        // What tasks reported is of the token of their plan, so the state is asked of that plan if it is of the same frames.
+        let earlier = self.folder.read_plan().ok();
+        let equal =
+            earlier.as_ref().filter(|earlier| (&earlier.digests, &earlier.products) == (&plan.digests, &plan.products));
+        Ok(status::status(&self.job, &self.folder, equal.unwrap_or(plan), None)?.is_complete())
     }
 
     fn slurm_options(&self, [memory_bytes, finish_memory_bytes]: [f64; 2]) -> Result<SlurmOptions, FarmError> {
-        let io = |source| FarmError::Io { path: self.current.clone(), source };
-        let cores = || thread::available_parallelism().map_or(1, usize::from);
+        let program = self.args.program.clone().map_or_else(env::current_exe, Ok);
         Ok(SlurmOptions {
-            program: self.args.program.clone().map_or_else(env::current_exe, Ok).map_err(io)?,
+            program: program.map_err(|source| FarmError::Io { path: self.current.clone(), source })?,
             name: self.job.scene.stem.clone(),
             partition: self.args.partition.clone(),
-            cpus: self.args.render.work.threads.map_or_else(cores, usize::from),
+            cpus: match self.args.render.work.threads {
+                Some(threads) => usize::from(threads),
+                None => thread::available_parallelism().map_or(1, usize::from),
+            },
             memory_bytes,
             finish_memory_bytes,
             sbatch: self.args.sbatch.clone(),
         })
     }
+}
+
+/// Size of a file, bytes; 0 where there is none.
+fn file_bytes(path: &Path) -> u64 {
+    fs::metadata(path).map_or(0, |file| file.len())
 }
 
 /// Free bytes on the disk of a folder, or of the nearest folder above it that exists.

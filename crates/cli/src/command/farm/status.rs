@@ -7,16 +7,16 @@ use bansho::{
         plural::counted,
         printable::{printable, printable_excerpt},
     },
-    farm::{
-        FarmError, FarmFolder,
-        status::{self, FarmStatus, FinishStatus, TaskState, TaskStatus},
-        task,
-    },
     job::{Job, SceneFile},
+};
+use bansho_farm::{
+    FarmError, FarmFolder,
+    status::{self, FarmStatus, FinishStatus, TaskState, TaskStatus},
+    task,
 };
 use serde_json::{Value, json};
 
-use super::{arguments, queue};
+use super::{arguments, slurm};
 use crate::{
     args::FarmStatusArgs,
     exit::ReportedError,
@@ -31,7 +31,7 @@ pub(crate) fn run(args: &FarmStatusArgs) -> anyhow::Result<()> {
     env::set_current_dir(&plan.folder).map_err(|source| FarmError::Io { path: plan.folder.clone(), source })?;
     let job = arguments::render_job(&plan.arguments)?;
     // Before the journals are read: what ends in between has written so.
-    let queue = queue::queue(&folder);
+    let queue = slurm::queue(&folder);
     let status = status::status(&job, &folder, &plan, queue.as_ref())?;
     print(&if args.json { format!("{}\n", json_text(&as_json(&status))) } else { as_text(&status) })?;
     if status.is_complete() { Ok(()) } else { Err(ReportedError::Incomplete.into()) }
@@ -70,9 +70,9 @@ fn as_text(status: &FarmStatus) -> String {
             )
         }
         (FinishStatus::Blocked { by }, _) => {
-            let cause =
-                |(name, why): &(String, String)| format!("{} ({})", printable_excerpt(name), printable_excerpt(why));
-            let causes: Vec<String> = by.iter().map(cause).collect();
+            let causes =
+                by.iter().map(|(name, why)| format!("{} ({})", printable_excerpt(name), printable_excerpt(why)));
+            let causes: Vec<String> = causes.collect();
             writeln!(text, "last job: did not run, because others failed: {}", causes.join("; "))
         }
     };

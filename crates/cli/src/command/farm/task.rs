@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bansho::farm::{FarmError, FarmFolder, TaskCheck, finish, journal::task_name, task};
+use bansho_farm::{FarmError, FarmFolder, TaskCheck, finish, journal::task_name, task};
 
 use super::{
     arguments, flipbook_result,

@@ -1,9 +1,9 @@
 //! Operations of editors on a scene's text. Everything that an operation does not change is kept, including comments.
 
-use bansho_base::parameters::{Node, Table as Values, Value};
+use bansho_base::parameters::{Table as Values, Value};
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table, TableLike, Value as TomlValue};
 
-use super::document::{EditError, check_edited, parse_document, replace_value};
+use super::{EditError, check_edited, parse_document, replace_value};
 use crate::text::path::{Segment, ValuePath};
 
 /// One change of a scene.
@@ -162,18 +162,17 @@ fn parent<'a, 'p>(
     let mut slot = Slot::HeaderTable(root);
     for (depth, segment) in parents.iter().enumerate() {
         if let (true, Segment::Key(key)) = (create, segment) {
-            let missing = |table: &dyn TableLike| !table.contains_key(key);
-            let inline = || match path.segments().get(depth + 1) {
+            let inline = match path.segments().get(depth + 1) {
                 Some(Segment::Index(0)) => Array::from_iter([InlineTable::new()]).into(),
                 _ => TomlValue::from(InlineTable::new()),
             };
             match &mut slot {
                 // A table at the root gets a header; a nested one is inline.
-                Slot::HeaderTable(table) if missing(*table) => {
-                    table.insert(key, if depth == 0 { Item::Table(Table::new()) } else { inline().into() });
+                Slot::HeaderTable(table) if !table.contains_key(key) => {
+                    table.insert(key, if depth == 0 { Item::Table(Table::new()) } else { inline.into() });
                 }
-                Slot::InlineTable(table) if missing(*table) => {
-                    table.insert(key, inline());
+                Slot::InlineTable(table) if !table.contains_key(key) => {
+                    table.insert(key, inline);
                 }
                 _ => {}
             }
@@ -293,8 +292,10 @@ fn push_item(items: &mut Array, value: TomlValue) {
 
 /// Whether a table contains lists of tables.
 fn contains_tables(values: &Values) -> bool {
-    let is_table = |item: &Node| matches!(item.value, Value::Table(_));
-    values.entries.iter().any(|entry| matches!(&entry.node.value, Value::List(items) if items.iter().any(is_table)))
+    values.entries.iter().any(|entry| match &entry.node.value {
+        Value::List(items) => items.iter().any(|item| matches!(item.value, Value::Table(_))),
+        _ => false,
+    })
 }
 
 /// A table under a header, with an empty line before it.
@@ -356,16 +357,19 @@ fn set_keyframe(root: &mut Table, path: &ValuePath, time: f64, value: &TomlValue
 }
 
 fn remove_keyframe(root: &mut Table, path: &ValuePath, time: f64) -> Result<(), EditError> {
-    let missing = || EditError::NoKeyframe { path: path.to_string(), time };
-    let keys = keyframes(root, path).ok_or_else(missing)?;
-    let index = keys.iter().position(|key| is_at(key, time)).ok_or_else(missing)?;
+    let missing = EditError::NoKeyframe { path: path.to_string(), time };
+    let Some(keys) = keyframes(root, path) else { return Err(missing) };
+    let Some(index) = keys.iter().position(|key| is_at(key, time)) else { return Err(missing) };
     if keys.len() > 1 {
         keys.remove(index);
         normalize_spaces(keys);
         return Ok(());
     }
-    let last = keys.get(index).and_then(|key| key.as_array()?.get(1)).cloned().ok_or_else(missing)?;
-    set(root, path, last)
+    // The last keyframe leaves its value as a constant.
+    match keys.get(index).and_then(|key| key.as_array()?.get(1)).cloned() {
+        Some(last) => set(root, path, last),
+        None => Err(missing),
+    }
 }
 
 #[cfg(test)]

@@ -2,10 +2,7 @@
 
 use toml_edit::{Array, InlineTable, Item, Table, TableLike, Value};
 
-use super::{
-    document::{EditError, check_edited, parse_document, replace_value},
-    suggest_path::suggest_paths,
-};
+use super::{EditError, check_edited, parse_document, replace_value, suggest_path::suggest_paths};
 use bansho_base::tables::{self, TableKind};
 
 /// Applies `assignment`, in the form `key.path=value`, to a scene's text.
@@ -152,8 +149,7 @@ fn number(segment: &str) -> Option<usize> {
 
 /// Whether a segment looks like a key rather than like a phenomenon's name or number.
 fn is_key_like(segment: &str) -> bool {
-    let is_key_byte = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
-    number(segment).is_none() && segment.bytes().all(is_key_byte)
+    number(segment).is_none() && segment.bytes().all(|byte| matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'_'))
 }
 
 /// The numbers of the items of a list, for messages.

@@ -20,22 +20,24 @@ pub(super) fn suggest_paths(text: &str, segments: &[&str], kinds: &[TableKind]) 
     {
         return vec![format!("{table}.{}", rest.join("."))];
     }
-    let paths_ending_with = |segments: &[&str]| -> Vec<String> {
-        let matches = || known.iter().filter(|path| path.ends_with(segments));
-        // The parameter of a table is preferred to that of a table within it.
-        let shortest = matches().map(Vec::len).min();
-        matches().filter(|path| Some(path.len()) == shortest).take(MAX_SUGGESTIONS).map(|path| path.join(".")).collect()
-    };
-    let last = [segments[segments.len() - 1]];
-    let mut suggestions = paths_ending_with(segments);
+    let last = segments[segments.len() - 1];
+    let mut suggestions = paths_ending_with(&known, segments);
     if suggestions.is_empty() {
-        suggestions = paths_ending_with(&last);
+        suggestions = paths_ending_with(&known, &[last]);
     }
     if suggestions.is_empty() {
         let names = known.iter().filter_map(|path| path.last().copied());
-        suggestions = nearest(last[0], names).map_or_else(Vec::new, |name| paths_ending_with(&[name]));
+        suggestions = nearest(last, names).map_or_else(Vec::new, |name| paths_ending_with(&known, &[name]));
     }
     suggestions
+}
+
+/// Up to [`MAX_SUGGESTIONS`] of the paths that end with `segments`. The parameter of a table is preferred to that of a table within it.
+fn paths_ending_with(known: &[Vec<&str>], segments: &[&str]) -> Vec<String> {
+    let matches: Vec<&Vec<&str>> = known.iter().filter(|path| path.ends_with(segments)).collect();
+    let shortest = matches.iter().map(|path| path.len()).min();
+    let preferred = matches.into_iter().filter(|path| Some(path.len()) == shortest);
+    preferred.take(MAX_SUGGESTIONS).map(|path| path.join(".")).collect()
 }
 
 /// The kinds of the tables that a scene has, its phenomena first. It has some even if its text does not contain them.
@@ -81,10 +83,16 @@ fn add_parameters(
 
 /// The values of a key in tables, and in the tables of lists.
 fn values_of_key<'a>(values: &[&'a Value], key: &str) -> Vec<&'a Value> {
-    let in_table = |value: &'a Value| if let Value::Table(table) = value { table.get(key) } else { None };
-    let found = values.iter().flat_map(|value| match value {
-        Value::List(items) => items.iter().filter_map(|item| in_table(&item.value)).collect::<Vec<_>>(),
-        value => in_table(value).into_iter().collect(),
+    let mut tables: Vec<&Value> = Vec::new();
+    for value in values {
+        match value {
+            Value::List(items) => tables.extend(items.iter().map(|item| &item.value)),
+            value => tables.push(value),
+        }
+    }
+    let stated = tables.into_iter().filter_map(|value| match value {
+        Value::Table(table) => table.get(key),
+        _ => None,
     });
-    found.map(|node| &node.value).collect()
+    stated.map(|node| &node.value).collect()
 }

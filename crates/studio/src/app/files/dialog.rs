@@ -58,17 +58,20 @@ impl FileDialog {
 
     /// Reads the entries of the folder; none where it cannot be read.
     fn read(&mut self) {
-        let found = std::fs::read_dir(&self.folder).into_iter().flatten().filter_map(Result::ok);
-        let entry = |found: std::fs::DirEntry| {
-            let name = found.file_name().into_string().ok().filter(|name| !name.starts_with('.'))?;
-            if found.path().is_dir() {
-                return Some(Entry::Folder(name));
-            }
+        let mut entries = Vec::new();
+        for found in std::fs::read_dir(&self.folder).into_iter().flatten().flatten() {
+            let Some(name) = found.file_name().into_string().ok().filter(|name| !name.starts_with('.')) else {
+                continue;
+            };
             let lowercase = name.to_ascii_lowercase();
-            self.extensions.iter().any(|extension| lowercase.ends_with(extension)).then_some(Entry::File(name))
-        };
-        self.entries = found.filter_map(entry).collect();
-        self.entries.sort();
+            if found.path().is_dir() {
+                entries.push(Entry::Folder(name));
+            } else if self.extensions.iter().any(|extension| lowercase.ends_with(extension)) {
+                entries.push(Entry::File(name));
+            }
+        }
+        entries.sort();
+        self.entries = entries;
     }
 
     fn go_to(&mut self, folder: PathBuf) {

@@ -62,10 +62,10 @@ impl Session {
     fn add_mesh(&mut self, selection: &Selection, name: Value) {
         let selected = selection.phenomenon().into_iter();
         let first_of_kinds = phenomena().map(|kind| PhenomenonId { kind: kind.key, index: 0 });
-        let import = |phenomenon: PhenomenonId| Some((phenomenon.path(), editor_hints(phenomenon.kind).mesh_import?));
-        let is_stated = |path: &ValuePath| path.find(self.document.values()).is_some();
-        let mut imports = selected.chain(first_of_kinds).filter_map(import);
-        let Some((path, import)) = imports.find(|(path, _)| is_stated(path)) else {
+        let mut imports = selected
+            .chain(first_of_kinds)
+            .filter_map(|phenomenon| Some((phenomenon.path(), editor_hints(phenomenon.kind).mesh_import?)));
+        let Some((path, import)) = imports.find(|(path, _)| path.find(self.document.values()).is_some()) else {
             let kinds = phenomena().filter(|kind| editor_hints(kind.key).mesh_import.is_some()).map(|kind| kind.key);
             let kinds = kinds.collect::<Vec<_>>().join(" or ");
             self.set_notice(Some(format!("a mesh is added to a {kinds}, which this scene lacks: add one first")));

@@ -69,11 +69,6 @@ fn write_bundled_file(name: &str, bytes: &[u8], folder: &Path) -> Result<String,
 /// The path from the folder `after` to the file `name` in the folder `before`; `name` itself where there is no such file.
 fn path_from_new_folder(name: &str, before: &Path, after: &Path) -> String {
     let old = before.join(name);
-    let absolute = |folder: &Path| {
-        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        // The new folder may not exist yet.
-        folder.canonicalize().or_else(|_| std::path::absolute(folder)).ok()
-    };
     // The name may be a pattern of frame numbers, so only its folder is checked.
     let found =
         old.parent().zip(old.file_name()).filter(|(folder, _)| folder.as_os_str().is_empty() || folder.is_dir());
@@ -82,6 +77,13 @@ fn path_from_new_folder(name: &str, before: &Path, after: &Path) -> String {
         return name.to_owned();
     };
     relative_path(&file, &after).to_string_lossy().replace('\\', "/")
+}
+
+/// A folder, which may be the current one, as an absolute path.
+fn absolute(folder: &Path) -> Option<PathBuf> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    // The new folder may not exist yet.
+    folder.canonicalize().or_else(|_| std::path::absolute(folder)).ok()
 }
 
 /// The relative path from `folder` to `file`, which are absolute; `file` itself where only the root is common.

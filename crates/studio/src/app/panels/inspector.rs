@@ -62,13 +62,13 @@ impl SearchFilter {
 
     /// Whether a parameter, or any within it, matches.
     fn matches(&self, parameter: &Descriptor) -> bool {
-        let contains = |text: &str| text.to_lowercase().contains(&self.0);
         let inside = match &parameter.kind {
             Kind::Table(inner) => self.matches_table(inner()),
             Kind::List { item, .. } => matches!(&**item, Kind::Table(inner) if self.matches_table(inner())),
             _ => false,
         };
-        inside || contains(&key_label(parameter.key)) || contains(&parameter.doc)
+        let own = [&key_label(parameter.key), &*parameter.doc];
+        inside || own.iter().any(|text| text.to_lowercase().contains(&self.0))
     }
 
     fn matches_table(&self, table: &TableDescriptor) -> bool {

@@ -68,6 +68,6 @@ fn changed_line(before: &str, after: &str) -> usize {
 
 /// The range of characters at a range of bytes of the text.
 fn char_range(text: &str, span: &Span) -> CCursorRange {
-    let characters = |byte: usize| text.char_indices().take_while(|(at, _)| *at < byte).count();
-    CCursorRange::two(CCursor::new(characters(span.start)), CCursor::new(characters(span.end)))
+    let [start, end] = [span.start, span.end].map(|byte| text.char_indices().take_while(|(at, _)| *at < byte).count());
+    CCursorRange::two(CCursor::new(start), CCursor::new(end))
 }

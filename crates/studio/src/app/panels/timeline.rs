@@ -20,18 +20,17 @@ pub(crate) fn timeline_ui(ui: &mut Ui, session: &mut Session) {
 
 fn transport_ui(ui: &mut Ui, session: &mut Session) {
     let transport = &mut session.transport;
-    let button = |ui: &mut Ui, icon: Icon, name: &str| icon::button_ui(ui, icon, name).clicked();
-    if button(ui, Icon::First, "First frame") {
+    if icon::button_ui(ui, Icon::First, "First frame").clicked() {
         transport.go_to(*transport.range().start());
     }
-    if button(ui, Icon::StepBack, "Frame back") {
+    if icon::button_ui(ui, Icon::StepBack, "Frame back").clicked() {
         transport.step(-1);
     }
     let (icon, name) = if transport.is_playing() { (Icon::Pause, "Pause") } else { (Icon::Play, "Play") };
-    if button(ui, icon, name) {
+    if icon::button_ui(ui, icon, name).clicked() {
         transport.set_playing(!transport.is_playing());
     }
-    if button(ui, Icon::StepForward, "Frame on") {
+    if icon::button_ui(ui, Icon::StepForward, "Frame on").clicked() {
         transport.step(1);
     }
     let frames = transport.frames();
@@ -60,13 +59,29 @@ fn range_ui(ui: &mut Ui, session: &mut Session) {
     }
 }
 
+/// Where frames are on the bar, from frame `first` at its left to `last` at its right.
+struct Bar {
+    rect: Rect,
+    first: i64,
+    last: i64,
+}
+
+impl Bar {
+    /// The horizontal position of a frame, which may lie between two.
+    fn x(&self, number: f64) -> f32 {
+        let fraction = (number - self.first as f64) / (self.last - self.first) as f64;
+        self.rect.left() + fraction as f32 * self.rect.width()
+    }
+}
+
 fn bar_ui(ui: &mut Ui, session: &mut Session) {
     let (response, painter) = ui.allocate_painter(vec2(ui.available_width(), 22.0), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Timeline"));
     let rect = response.rect.shrink2(vec2(6.0, 3.0));
     let frames = session.transport.frames();
+    // A shot of one frame has a bar of two, so that its length is not 0.
     let (first, last) = (*frames.start(), (*frames.end()).max(frames.start() + 1));
-    let x_of = |number: f64| rect.left() + ((number - first as f64) / (last - first) as f64) as f32 * rect.width();
+    let bar = Bar { rect, first, last };
     if let Some(at) = response.interact_pointer_pos().filter(|_| response.is_pointer_button_down_on()) {
         let fraction = f64::from(((at.x - rect.left()) / rect.width()).clamp(0.0, 1.0));
         session.transport.set_playing(false);
@@ -75,14 +90,14 @@ fn bar_ui(ui: &mut Ui, session: &mut Session) {
     let visuals = ui.visuals();
     painter.rect_filled(rect, CornerRadius::same(2), visuals.extreme_bg_color);
     let range = session.transport.range();
-    let played = Rect::from_x_y_ranges(x_of(*range.start() as f64)..=x_of(*range.end() as f64), rect.y_range());
+    let played = Rect::from_x_y_ranges(bar.x(*range.start() as f64)..=bar.x(*range.end() as f64), rect.y_range());
     painter.rect_filled(played, CornerRadius::same(2), visuals.widgets.inactive.bg_fill);
     let frame_s = session.transport.frame_s();
     for time in keyframe_times(session) {
-        let at = pos2(x_of(first as f64 + time / frame_s), rect.center().y);
+        let at = pos2(bar.x(first as f64 + time / frame_s), rect.center().y);
         painter.circle_filled(at, 3.0, Color32::from_rgb(235, 170, 60));
     }
-    let x = x_of(session.transport.number() as f64);
+    let x = bar.x(session.transport.number() as f64);
     painter.vline(x, response.rect.y_range(), Stroke::new(2.0, visuals.selection.bg_fill));
     if response.secondary_clicked() || response.clicked_by(PointerButton::Middle) {
         session.transport.set_range(None);

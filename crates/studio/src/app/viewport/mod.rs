@@ -6,11 +6,7 @@ mod pointer;
 mod wind_drag;
 
 use bansho::{
-    base::{
-        camera::Camera,
-        math::{DVec2, DVec3},
-        parameters::Value,
-    },
+    base::{camera::Camera, math::DVec2, parameters::Value},
     scene::ValuePath,
 };
 
@@ -121,8 +117,7 @@ impl Viewport {
         let time = session.transport.time_s();
         let camera = plan.scene().camera.at(time, plan.size());
         let pose = CameraPose::at_time(&plan, session.document.values(), time);
-        let heights = |drag: Vec2| DVec2::new(f64::from(drag.x), f64::from(drag.y)) / f64::from(frame.height());
-        let drag = heights(response.drag_delta());
+        let drag = in_heights(response.drag_delta(), frame);
         let shift = ui.input(|input| input.modifiers.shift);
         let is_pan = response.dragged_by(PointerButton::Middle)
             || (shift && self.tool == ViewportTool::Camera && response.dragged_by(PointerButton::Primary));
@@ -135,7 +130,7 @@ impl Viewport {
             set_camera(session, pose.rotated(drag, &camera));
         }
         self.dolly(ui, session, response, pose);
-        self.drag_wind(session, response, &camera, heights(response.total_drag_delta().unwrap_or_default()));
+        self.drag_wind(session, response, &camera, in_heights(response.total_drag_delta().unwrap_or_default(), frame));
         self.drag_handle(ui, session, response, &camera, frame);
     }
 
@@ -176,18 +171,14 @@ impl Viewport {
     }
 
     fn drag_handle(&mut self, ui: &Ui, session: &mut Session, response: &Response, camera: &Camera, frame: Rect) {
-        /// Hit radius of a handle, points.
-        const HIT_RADIUS: f32 = 14.0;
         if self.tool != ViewportTool::MoveHandles {
             return;
         }
         let handles = handles(session);
-        let on_screen = |handle: &Handle| Some(to_screen(camera.project(handle.point)?.pixel, camera, frame));
         if response.drag_started_by(PointerButton::Primary) {
-            let from = ui.input(|input| input.pointer.press_origin());
-            let near = |handle: &&Handle| Some((on_screen(handle)?.distance(from?), handle.path.clone()));
-            let nearest = handles.iter().filter_map(|handle| near(&handle)).min_by(|a, b| a.0.total_cmp(&b.0));
-            self.dragged = nearest.filter(|(distance, _)| *distance < HIT_RADIUS).map(|(_, path)| path);
+            let pressed_at = ui.input(|input| input.pointer.press_origin());
+            self.dragged =
+                pressed_at.and_then(|at| handle_near(&handles, at, camera, frame)).map(|handle| handle.path.clone());
             if session.recording && self.dragged.is_some() {
                 session.transport.play_to_the_end();
             }
@@ -219,10 +210,27 @@ impl Viewport {
     }
 }
 
+/// A drag in points as heights of the picture, which fills `frame`.
+fn in_heights(drag: Vec2, frame: Rect) -> DVec2 {
+    DVec2::new(f64::from(drag.x), f64::from(drag.y)) / f64::from(frame.height())
+}
+
+/// The handle that is shown nearest to `at`, if one is close enough to be dragged.
+fn handle_near<'a>(handles: &'a [Handle], at: Pos2, camera: &Camera, frame: Rect) -> Option<&'a Handle> {
+    /// Hit radius of a handle, points.
+    const HIT_RADIUS: f32 = 14.0;
+    let distances = handles.iter().filter_map(|handle| {
+        let pixel = camera.project(handle.point)?.pixel;
+        Some((to_screen(pixel, camera, frame).distance(at), handle))
+    });
+    let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.filter(|(distance, _)| *distance < HIT_RADIUS).map(|(_, handle)| handle)
+}
+
 fn set_camera(session: &mut Session, pose: CameraPose) {
     let camera = ValuePath::root().key("camera");
-    let value = |key: &str, to: DVec3| (camera.key(key), Value::numbers(rounded(to)));
-    session.set_all("camera", [value("position", pose.position), value("target", pose.target)]);
+    let values = [("position", pose.position), ("target", pose.target)];
+    session.set_all("camera", values.map(|(key, to)| (camera.key(key), Value::numbers(rounded(to)))));
 }
 
 /// The exposure of the scene; a change replaces the automatic one.
@@ -274,11 +282,13 @@ fn fill_around(whole: Rect, hole: Rect, fill: Color32) -> Shape {
     Shape::Vec(visible.map(|strip| Shape::rect_filled(strip, 0.0, fill)).collect())
 }
 
+/// The position on the screen of a pixel of the camera's picture, which fills `frame`.
 fn to_screen(pixel: DVec2, camera: &Camera, frame: Rect) -> Pos2 {
-    let fraction = |at: f64, side: f64| (at / side) as f32;
-    frame.min + vec2(fraction(pixel.x, camera.size[0]), fraction(pixel.y, camera.size[1])) * frame.size()
+    let fraction = vec2((pixel.x / camera.size[0]) as f32, (pixel.y / camera.size[1]) as f32);
+    frame.min + fraction * frame.size()
 }
 
+/// The inverse of [`to_screen`].
 fn to_picture(at: Pos2, camera: &Camera, frame: Rect) -> DVec2 {
     let fraction = (at - frame.min) / frame.size();
     DVec2::new(f64::from(fraction.x) * camera.size[0], f64::from(fraction.y) * camera.size[1])

@@ -32,11 +32,10 @@ impl CameraPose {
     /// The pose at `time`, s: as the scene `root` states it, which may be newer than `plan`, else from `plan`.
     pub(super) fn at_time(plan: &Plan, root: &Table, time: f64) -> Self {
         let camera = &plan.scene().camera;
-        let stated = |key: &str| vector(root, &ValuePath::root().key("camera").key(key), time);
-        let or = |stated: Option<DVec3>, planned: [f64; 3]| stated.unwrap_or(DVec3::from(planned));
+        let stated = ["position", "target"].map(|key| vector(root, &ValuePath::root().key("camera").key(key), time));
         Self {
-            position: or(stated("position"), camera.position.at(time)),
-            target: or(stated("target"), camera.target.at(time)),
+            position: stated[0].unwrap_or_else(|| camera.position.at(time).into()),
+            target: stated[1].unwrap_or_else(|| camera.target.at(time).into()),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use bansho::base::{
     math::curve::{Curve, Interpolation},
-    parameters::{InterpolationName, Node, Table, Value},
+    parameters::{InterpolationName, Table, Value},
 };
 use eframe::egui::{
     self, Color32, CornerRadius, Id, PointerButton, Pos2, Rect, Response, Sense, Stroke, StrokeKind, Ui, pos2, vec2,
@@ -36,7 +36,6 @@ struct Chart {
 
 impl Chart {
     fn to_screen(&self, [x, y]: [f64; 2]) -> Pos2 {
-        let fraction = |value: f64, [low, high]: [f64; 2]| ((value - low) / (high - low)) as f32;
         pos2(
             self.rect.left() + fraction(x, self.x) * self.rect.width(),
             self.rect.bottom() - fraction(y, self.y) * self.rect.height(),
@@ -44,12 +43,11 @@ impl Chart {
     }
 
     fn to_curve(&self, at: Pos2) -> [f64; 2] {
-        let value = |fraction: f32, [low, high]: [f64; 2]| {
-            let exact = low + f64::from(fraction.clamp(0.0, 1.0)) * (high - low);
-            ((exact * 1000.0).round() / 1000.0).clamp(low, high)
-        };
         let rect = self.rect;
-        [value((at.x - rect.left()) / rect.width(), self.x), value((rect.bottom() - at.y) / rect.height(), self.y)]
+        [
+            rounded_value((at.x - rect.left()) / rect.width(), self.x),
+            rounded_value((rect.bottom() - at.y) / rect.height(), self.y),
+        ]
     }
 
     /// `y` of a point between neighbors at `before` and `after`, clamped between them if the curve must increase.
@@ -61,10 +59,21 @@ impl Chart {
     }
 
     fn nearest(&self, points: &[[f64; 2]], at: Pos2) -> Option<usize> {
-        let distance = |index: &usize| self.to_screen(points[*index]).distance(at);
-        let nearest = (0..points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.filter(|index| distance(index) < HIT_RADIUS)
+        let distances = points.iter().map(|point| self.to_screen(*point).distance(at)).enumerate();
+        let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.filter(|(_, distance)| *distance < HIT_RADIUS).map(|(index, _)| index)
     }
+}
+
+/// Where a value is between two bounds, as a fraction.
+fn fraction(value: f64, [low, high]: [f64; 2]) -> f32 {
+    ((value - low) / (high - low)) as f32
+}
+
+/// The inverse of [`fraction`], rounded to three decimals, as a value is that somebody would type.
+fn rounded_value(fraction: f32, [low, high]: [f64; 2]) -> f64 {
+    let exact = low + f64::from(fraction.clamp(0.0, 1.0)) * (high - low);
+    ((exact * 1000.0).round() / 1000.0).clamp(low, high)
 }
 
 /// Shows the curve `value` within `bounds`. Returns the curve if it was edited.
@@ -109,11 +118,11 @@ fn paint(painter: &egui::Painter, ui: &Ui, chart: &Chart, curve: &Curve) {
     let frame = visuals.widgets.noninteractive.bg_stroke;
     painter.rect(chart.rect, CornerRadius::same(2), visuals.extreme_bg_color, frame, StrokeKind::Inside);
     let columns = chart.rect.width() as usize;
-    let at = |column: usize| {
+    let line = (0..=columns).map(|column| {
         let x = chart.x[0] + (chart.x[1] - chart.x[0]) * column as f64 / columns.max(1) as f64;
         chart.to_screen([x, curve.eval(x).min(chart.y[1])])
-    };
-    painter.line((0..=columns).map(at).collect(), Stroke::new(1.5, visuals.selection.stroke.color));
+    });
+    painter.line(line.collect(), Stroke::new(1.5, visuals.selection.stroke.color));
     for point in curve.points() {
         painter.circle(chart.to_screen(*point), 4.0, visuals.text_color(), Stroke::new(1.0, Color32::BLACK));
     }
@@ -181,11 +190,11 @@ fn parse_curve(value: &Value) -> Option<(Vec<[f64; 2]>, InterpolationName)> {
         }
         _ => return None,
     };
-    let point = |item: &Node| match &item.value {
+    let points = list.iter().map(|item| match &item.value {
         Value::List(pair) => Some([pair.first()?.value.as_number()?, pair.get(1)?.value.as_number()?]),
         _ => None,
-    };
-    Some((list.iter().map(point).collect::<Option<_>>()?, name))
+    });
+    Some((points.collect::<Option<_>>()?, name))
 }
 
 fn curve_value(points: Vec<[f64; 2]>, name: InterpolationName) -> Value {

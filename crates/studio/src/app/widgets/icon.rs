@@ -41,31 +41,63 @@ pub(crate) fn button_ui(ui: &mut Ui, icon: Icon, name: &str) -> Response {
 
 impl Icon {
     fn shapes(self, rect: Rect, stroke: Stroke) -> Vec<Shape> {
-        let filled = |points: Vec<Pos2>| Shape::convex_polygon(points, stroke.color, Stroke::NONE);
-        let line = |points: Vec<Pos2>| Shape::line(points, Stroke::new(1.5, stroke.color));
-        let at = |x: f32, y: f32| pos2(rect.left() + x * rect.width(), rect.top() + y * rect.height());
-        let bar = |x: f32| Shape::rect_filled(Rect::from_min_max(at(x, 0.0), at(x + 0.28, 1.0)), 0.0, stroke.color);
-        let diamond = || vec![at(0.5, -0.1), at(1.1, 0.5), at(0.5, 1.1), at(-0.1, 0.5), at(0.5, -0.1)];
+        let pen = Pen { rect, stroke: Stroke::new(1.5, stroke.color) };
         match self {
-            Self::First => vec![bar(-0.1), filled(vec![at(1.1, 0.0), at(1.1, 1.0), at(0.3, 0.5)])],
-            Self::StepBack => vec![filled(vec![at(0.75, 0.1), at(0.75, 0.9), at(0.15, 0.5)])],
-            Self::Play => vec![filled(vec![at(0.1, -0.1), at(1.1, 0.5), at(0.1, 1.1)])],
-            Self::Pause => vec![bar(0.08), bar(0.64)],
-            Self::StepForward => vec![filled(vec![at(0.25, 0.1), at(0.85, 0.5), at(0.25, 0.9)])],
-            Self::Constant => vec![line(diamond())],
-            Self::Keyframed => vec![line(diamond()), Shape::circle_filled(rect.center(), 1.8, stroke.color)],
-            Self::KeyframeHere => vec![filled(diamond())],
-            Self::Reset => reset_shapes(rect, stroke),
-            Self::Cross => vec![line(vec![at(0.1, 0.1), at(0.9, 0.9)]), line(vec![at(0.9, 0.1), at(0.1, 0.9)])],
+            Self::First => vec![pen.bar(-0.1), pen.filled(&[[1.1, 0.0], [1.1, 1.0], [0.3, 0.5]])],
+            Self::StepBack => vec![pen.filled(&[[0.75, 0.1], [0.75, 0.9], [0.15, 0.5]])],
+            Self::Play => vec![pen.filled(&[[0.1, -0.1], [1.1, 0.5], [0.1, 1.1]])],
+            Self::Pause => vec![pen.bar(0.08), pen.bar(0.64)],
+            Self::StepForward => vec![pen.filled(&[[0.25, 0.1], [0.85, 0.5], [0.25, 0.9]])],
+            Self::Constant => vec![pen.line(&DIAMOND)],
+            Self::Keyframed => vec![pen.line(&DIAMOND), Shape::circle_filled(rect.center(), 1.8, stroke.color)],
+            Self::KeyframeHere => vec![pen.filled(&DIAMOND)],
+            Self::Reset => pen.reset_arrow(),
+            Self::Cross => vec![pen.line(&[[0.1, 0.1], [0.9, 0.9]]), pen.line(&[[0.9, 0.1], [0.1, 0.9]])],
         }
     }
 }
 
-/// An arc with an arrowhead.
-fn reset_shapes(rect: Rect, stroke: Stroke) -> Vec<Shape> {
-    let radius = 0.5 * rect.width();
-    let on = |turns: f32| rect.center() + radius * Vec2::angled(std::f32::consts::TAU * turns);
-    let arc = (0..=18).map(|step| on(-0.12 + 0.75 * step as f32 / 18.0)).collect();
-    let head = |by: Vec2| Shape::line_segment([on(-0.12), on(-0.12) + by], Stroke::new(1.5, stroke.color));
-    vec![Shape::line(arc, Stroke::new(1.5, stroke.color)), head(vec2(-4.0, -0.5)), head(vec2(0.5, -4.0))]
+/// A closed diamond around the whole icon.
+const DIAMOND: [[f32; 2]; 5] = [[0.5, -0.1], [1.1, 0.5], [0.5, 1.1], [-0.1, 0.5], [0.5, -0.1]];
+
+/// Draws in fractions of a rectangle, from its upper left corner.
+struct Pen {
+    rect: Rect,
+    stroke: Stroke,
+}
+
+impl Pen {
+    fn at(&self, [x, y]: [f32; 2]) -> Pos2 {
+        pos2(self.rect.left() + x * self.rect.width(), self.rect.top() + y * self.rect.height())
+    }
+
+    fn points(&self, points: &[[f32; 2]]) -> Vec<Pos2> {
+        points.iter().map(|point| self.at(*point)).collect()
+    }
+
+    /// A line through points.
+    fn line(&self, points: &[[f32; 2]]) -> Shape {
+        Shape::line(self.points(points), self.stroke)
+    }
+
+    /// A convex polygon.
+    fn filled(&self, points: &[[f32; 2]]) -> Shape {
+        Shape::convex_polygon(self.points(points), self.stroke.color, Stroke::NONE)
+    }
+
+    /// A vertical bar of the whole height, whose left side is at `x`.
+    fn bar(&self, x: f32) -> Shape {
+        let corners = Rect::from_min_max(self.at([x, 0.0]), self.at([x + 0.28, 1.0]));
+        Shape::rect_filled(corners, 0.0, self.stroke.color)
+    }
+
+    /// An arc of three quarters of a circle with an arrowhead at its start.
+    fn reset_arrow(&self) -> Vec<Shape> {
+        let (center, radius) = (self.rect.center(), 0.5 * self.rect.width());
+        let arc = (0..=18).map(|step| -0.12 + 0.75 * step as f32 / 18.0);
+        let arc = arc.map(|turns| center + radius * Vec2::angled(std::f32::consts::TAU * turns)).collect::<Vec<_>>();
+        let tip = arc[0];
+        let heads = [vec2(-4.0, -0.5), vec2(0.5, -4.0)].map(|by| Shape::line_segment([tip, tip + by], self.stroke));
+        [Shape::line(arc, self.stroke)].into_iter().chain(heads).collect()
+    }
 }

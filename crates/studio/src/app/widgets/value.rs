@@ -106,34 +106,41 @@ impl ValueEditor<'_> {
         }
     }
 
+    /// Component `index` of the default of a vector.
+    fn default_component(&self, index: usize) -> Option<f64> {
+        match self.default {
+            Some(Value::List(items)) => items.get(index)?.value.as_number(),
+            _ => None,
+        }
+    }
+
+    /// Component `index` of a vector, which is `item`. Returns whether it was edited.
+    fn component_ui(&self, ui: &mut Ui, index: usize, item: &mut Node, bounds: [f64; 2], is_integer: bool) -> bool {
+        let Some(number) = item.value.as_number() else { return false };
+        let Some(number) = self.number_ui(ui, number, bounds, self.default_component(index)) else { return false };
+        item.value = if is_integer { Value::Integer(number.round() as i64) } else { Value::Number(number) };
+        true
+    }
+
     /// Numbers in a row; if they have bounds, each in a row of its own with a slider.
     fn vector_ui(&self, ui: &mut Ui, value: &Value, bounds: [f64; 2]) -> Option<Value> {
         let Value::List(items) = value else { return None };
-        let default = |index: usize| match self.default {
-            Some(Value::List(items)) => items.get(index)?.value.as_number(),
-            _ => None,
-        };
         let is_integer = items.iter().all(|item| matches!(item.value, Value::Integer(_)));
         let mut edited = items.clone();
         let mut changed = false;
-        let has_sliders = SliderScale::for_bounds(bounds, default(0)).is_some();
+        let has_sliders = SliderScale::for_bounds(bounds, self.default_component(0)).is_some();
         let component = Self { unit: if has_sliders { self.unit } else { "" }, ..*self };
-        let mut show = |ui: &mut Ui, index: usize, item: &mut Node| {
-            let Some(number) = item.value.as_number() else { return };
-            if let Some(number) = component.number_ui(ui, number, bounds, default(index)) {
-                changed = true;
-                item.value = if is_integer { Value::Integer(number.round() as i64) } else { Value::Number(number) };
-            }
-        };
         if has_sliders {
             ui.vertical(|ui| {
                 for (index, item) in edited.iter_mut().enumerate() {
-                    ui.horizontal(|ui| show(ui, index, item));
+                    changed |= ui.horizontal(|ui| component.component_ui(ui, index, item, bounds, is_integer)).inner;
                 }
             });
         } else {
             ui.horizontal(|ui| {
-                edited.iter_mut().enumerate().for_each(|(index, item)| show(ui, index, item));
+                for (index, item) in edited.iter_mut().enumerate() {
+                    changed |= component.component_ui(ui, index, item, bounds, is_integer);
+                }
                 ui.weak(self.unit);
             });
         }
@@ -146,8 +153,11 @@ impl ValueEditor<'_> {
             number => number.to_string(),
         };
         let changed = ui.text_edit_singleline(&mut text).labelled_by(self.label).changed();
-        let number = || text.parse::<f64>().ok().filter(|_| matches!(self.kind, Kind::Rational { .. }));
-        changed.then(|| number().map_or_else(|| Value::Text(text.clone()), Value::Number))
+        // A rational is a number or a fraction in quotes.
+        changed.then(|| match text.parse() {
+            Ok(number) if matches!(self.kind, Kind::Rational { .. }) => Value::Number(number),
+            _ => Value::Text(text),
+        })
     }
 
     fn choice_ui(&self, ui: &mut Ui, value: &Value, choices: &[Choice]) -> Option<Value> {
@@ -188,8 +198,8 @@ pub(crate) fn initial_value(kind: &Kind) -> Value {
         Kind::Text | Kind::Asset => Value::Text(String::new()),
         Kind::Choice(choices) => Value::Text(choices.first().map_or_else(String::new, |choice| choice.name.into())),
         Kind::Curve { x, y, .. } => {
-            let point = |x: f64| Node::from(Value::numbers([x, y[1]]));
-            Value::List(vec![point(x[0]), point(x[1])])
+            // The whole of the greater value, from one end to the other.
+            Value::List(x.map(|x| Node::from(Value::numbers([x, y[1]]))).into())
         }
         Kind::Animated(inner) | Kind::Optional(inner) | Kind::Auto(inner) => initial_value(inner),
         Kind::List { .. } => Value::List(Vec::new()),

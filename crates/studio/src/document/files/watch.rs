@@ -41,7 +41,7 @@ impl FileWatcher {
     pub fn start(path: &Path, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let (watched, flags) = (path.to_path_buf(), shared.clone());
-        let poll = move || {
+        thread::Builder::new().name("watch".into()).spawn(move || {
             let mut last = modification_stamp(&watched);
             while !flags.closing.load(Ordering::Relaxed) {
                 thread::sleep(POLL_INTERVAL);
@@ -52,8 +52,7 @@ impl FileWatcher {
                     wake();
                 }
             }
-        };
-        thread::Builder::new().name("watch".into()).spawn(poll)?;
+        })?;
         Ok(Self { path: path.to_path_buf(), shared })
     }
 

@@ -129,8 +129,10 @@ impl AuroraEditor {
             return;
         }
         let (around, radius) = (pointer.point(), pointer.hit_radius(self.tool));
-        let under = |line: &[DVec2]| polyline::nearest(line, around).is_some_and(|on| on.distance < radius);
-        let Some(sheet) = drawing.lines(self.target).iter().position(|line| under(line)) else { return };
+        let lines = drawing.lines(self.target);
+        let under_pointer =
+            lines.iter().position(|line| polyline::nearest(line, around).is_some_and(|on| on.distance < radius));
+        let Some(sheet) = under_pointer else { return };
         let mut points = drawing.points(self.target, sheet);
         let change = if self.tool == DrawTool::Smooth {
             drawing.set_points(self.target, sheet, &polyline::smoothed(&points, around, radius))
@@ -185,12 +187,13 @@ impl AuroraEditor {
 
     fn merge(&mut self, session: &mut Session, drawing: &AuroraDrawing, pointer: &PointerInput) {
         let Some(all) = self.source(drawing, pointer) else { return };
-        let ends = all.iter().enumerate().flat_map(|(sheet, line)| {
-            let end = |last: bool| StrokeEnd { sheet, last };
-            [(line.first().copied(), end(false)), (line.last().copied(), end(true))]
-        });
-        let near = |(point, end): (Option<DVec2>, StrokeEnd)| Some((point?.distance(pointer.point()), end));
-        let nearest = ends.filter_map(near).min_by(|a, b| a.0.total_cmp(&b.0));
+        let mut ends = Vec::new();
+        for (sheet, line) in all.iter().enumerate() {
+            for (point, last) in [(line.first(), false), (line.last(), true)] {
+                ends.extend(point.map(|point| (point.distance(pointer.point()), StrokeEnd { sheet, last })));
+            }
+        }
+        let nearest = ends.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, end)) = nearest.filter(|near| near.0 < pointer.hit_radius(self.tool)) else {
             if pointer.sheet_near(&all, self.tool).is_some() {
                 self.shape_error = Some(("only ends merge: sheets never branch".into(), pointer.at));
@@ -225,8 +228,10 @@ impl AuroraEditor {
                 Side::Target => pressed.origin_of_arrival(drawing, self.target - 1),
             };
             let from = from.and_then(|from| on_sheet(&all, from, pointer.hit_radius(self.tool)));
-            let linking = |from| DragState::Linking { from, point_alone: side == Side::Target, at: pointer.at };
-            self.drag = from.map_or(DragState::None, linking);
+            self.drag = match from {
+                Some(from) => DragState::Linking { from, point_alone: side == Side::Target, at: pointer.at },
+                None => DragState::None,
+            };
         }
         if pointer.response.clicked() && side == Side::Target {
             let unlinked = drawing.unlink(self.target, pointer.point(), pointer.hit_radius(self.tool));
@@ -316,9 +321,9 @@ impl PointerInput<'_> {
     /// The point on shape `before` of the control point that arrives nearest to the pointer.
     fn origin_of_arrival(&self, drawing: &AuroraDrawing, before: usize) -> Option<DVec2> {
         let point_paths = drawing.point_paths(before);
-        let distance = |point_path: &&[DVec2; 2]| point_path[1].distance(self.point());
-        let nearest = point_paths.iter().flatten().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.filter(|path| distance(path) < self.hit_radius(DrawTool::Link)).map(|path| path[0])
+        let paths = point_paths.iter().flatten().map(|[origin, arrival]| (arrival.distance(self.point()), *origin));
+        let nearest = paths.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.filter(|(distance, _)| *distance < self.hit_radius(DrawTool::Link)).map(|(_, origin)| origin)
     }
 
     fn sheet_at(&self, all: &[Vec<DVec2>]) -> Option<usize> {

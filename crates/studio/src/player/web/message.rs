@@ -122,9 +122,10 @@ fn array<const N: usize>(fields: [JsValue; N]) -> Array {
 
 /// A problem as an array. Without a span, both of its ends are null.
 fn write_problem(problem: &ReportedProblem) -> Array {
-    let end = |at: Option<usize>| at.map_or(JsValue::NULL, |at| (at as f64).into());
-    let [start, stop] =
-        [problem.span.as_ref().map(|span| span.start), problem.span.as_ref().map(|span| span.end)].map(end);
+    let [start, stop] = match &problem.span {
+        Some(span) => [span.start, span.end].map(|at| (at as f64).into()),
+        None => [JsValue::NULL; 2],
+    };
     let asset = problem.asset.as_deref().map_or(JsValue::NULL, JsValue::from);
     array([start, stop, (&*problem.path).into(), (&*problem.reason).into(), asset])
 }

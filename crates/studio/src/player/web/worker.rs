@@ -252,6 +252,6 @@ fn reply(number: u64, event: Event) -> Reply {
 
 /// The results of a check for which all phenomena must be built.
 fn check_report(outcome: Result<Arc<Plan>, SceneError>) -> CheckReport {
-    let problems = |error: SceneError| error.problems.iter().map(ReportedProblem::from).collect();
-    outcome.map(|plan| plan.exposure_ev100).map_err(problems)
+    let plan = outcome.map_err(|error| error.problems.iter().map(ReportedProblem::from).collect::<Vec<_>>())?;
+    Ok(plan.exposure_ev100)
 }

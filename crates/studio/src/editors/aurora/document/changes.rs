@@ -4,7 +4,7 @@ use bansho::{
     aurora::shapes::{Correspondence, Form, LinkParameters, SheetParameters},
     base::{
         math::{DVec2, curve::Curve},
-        parameters::{Node, Parameters, Table, Value},
+        parameters::{Parameters, Table, Value},
     },
     scene::{ValuePath, operation::Operation},
 };
@@ -13,7 +13,7 @@ use super::{
     AuroraDrawing, Factor, SheetPosition,
     links::rounded,
     polyline,
-    renumber::{JoinedPart, SheetRemap},
+    renumber::{JoinedPart, SheetRemap, integers},
     sheets::{DirectedCurve, curve_chain, curve_range, non_default, with_form, with_points},
 };
 
@@ -97,10 +97,9 @@ impl AuroraDrawing {
         let even: Vec<[f64; 2]> =
             (0..=INTERVALS).map(|step| step as f64 / INTERVALS as f64).map(|at| [at, curve.eval(at)]).collect();
         let [low, high] = factor.bounds();
-        let value = |value: f64| rounded(value.clamp(low, high));
-        let points =
-            polyline::brushed(&even, at, by, RADIUS).into_iter().map(|[at, factor]| [at, value(factor)]).collect();
-        if let Ok(painted) = Curve::new(points, curve.interpolation()) {
+        let brushed = polyline::brushed(&even, at, by, RADIUS).into_iter();
+        let points = brushed.map(|[at, factor]| [at, rounded(factor.clamp(low, high))]);
+        if let Ok(painted) = Curve::new(points.collect(), curve.interpolation()) {
             *curve = painted;
         }
         self.write(shape, &sheets)
@@ -114,37 +113,41 @@ impl AuroraDrawing {
         change.push("length_fraction", Value::Number(at));
         let mut operations =
             vec![Operation::Append { path: self.shape(shape).key("split"), value: Value::Table(change) }];
-        // A link of the split sheet becomes one of its first half.
-        let update_link = |link: &LinkParameters| match link.from_length_fraction {
-            None if link.from == sheet as i64 + 1 => {
-                LinkParameters { from_length_fraction: Some(rounded(0.5 * at)), ..link.clone() }
-            }
-            _ => link.clone(),
-        };
         let line = self.lines(shape - 1).into_iter().nth(sheet).unwrap_or_default();
         let from = polyline::at(&line, at);
         let changed = self.propagated(shape, from.as_slice(), |shape, targets| {
             let (sheets, cut) = self.cut_at(shape, *targets.first()?)?;
             Some(RemappedSheets { sheets, remap: SheetRemap::Cut(cut) })
         });
-        operations.extend(self.write_all(shape, &changed, update_link, |_| Vec::new()));
+        // A link of the split sheet becomes one of its first half.
+        let first_half = Some(rounded(0.5 * at));
+        operations.extend(self.write_all(
+            shape,
+            &changed,
+            |link| match link.from_length_fraction {
+                None if link.from == sheet as i64 + 1 => {
+                    LinkParameters { from_length_fraction: first_half, ..link.clone() }
+                }
+                _ => link.clone(),
+            },
+            |_| Vec::new(),
+        ));
         operations
     }
 
     /// Merges two ends of the shape before `shape`; the sheets that they become are joined too.
     pub fn merge(&self, shape: usize, ends: [StrokeEnd; 2]) -> Vec<Operation> {
         let mut change = Table::default();
-        let list = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
-        change.push("sheets", list(ends.map(|end| end.sheet as i64 + 1)));
-        change.push("ends", list(ends.map(|end| i64::from(end.last))));
+        change.push("sheets", integers(ends.map(|end| end.sheet as i64 + 1)));
+        change.push("ends", integers(ends.map(|end| i64::from(end.last))));
         let mut operations =
             vec![Operation::Append { path: self.shape(shape).key("merge"), value: Value::Table(change) }];
         let before = self.lines(shape - 1);
-        let at = |end: StrokeEnd| {
+        let points = ends.map(|end| {
             let line = before.get(end.sheet)?;
             if end.last { line.last().copied() } else { line.first().copied() }
-        };
-        if let [Some(first), Some(second)] = ends.map(at) {
+        });
+        if let [Some(first), Some(second)] = points {
             let joined = self.propagated(shape, &[first, second], |shape, targets| match targets {
                 &[first, second] => self.joined_at(shape, [first, second]),
                 _ => None,
@@ -241,8 +244,9 @@ impl AuroraDrawing {
     /// Duration of the transition to shape `shape`, s.
     pub fn transition_s(&self, shape: usize) -> f64 {
         let hold = self.parameters.shapes.get(shape.wrapping_sub(1)).map_or(0.0, |before| before.hold_s);
-        let at = |shape: usize| self.arrivals().get(shape).copied().unwrap_or_default();
-        at(shape) - at(shape.saturating_sub(1)) - hold
+        let [arrival, before] =
+            [shape, shape.saturating_sub(1)].map(|shape| self.arrivals().get(shape).copied().unwrap_or_default());
+        arrival - before - hold
     }
 
     /// Whether shapes are drawn as they are after their splits and merges, rather than before.
@@ -257,13 +261,13 @@ impl AuroraDrawing {
     /// The point of shape `shape` at which `from` on the shape before arrives.
     fn destination_of(&self, shape: usize, from: DVec2) -> Option<DVec2> {
         let strands = self.point_paths(shape - 1);
-        let on = |point_paths: &Vec<[DVec2; 2]>| {
+        let arrivals = strands.iter().filter_map(|point_paths| {
             let [leaving, arriving] =
                 [0, 1].map(|end| point_paths.iter().map(|point_path| point_path[end]).collect::<Vec<_>>());
             let on = polyline::nearest(&leaving, from)?;
             Some((on.distance, arriving.get(on.segment)?.lerp(*arriving.get(on.segment + 1)?, on.fraction)))
-        };
-        strands.iter().filter_map(on).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
+        });
+        arrivals.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
     }
 
     /// The sheets of shape `shape`, with the one at `target` cut there, and the position of the cut; `None` where there is nothing to cut.
@@ -312,12 +316,10 @@ impl AuroraDrawing {
         });
         let [one, other] = [polyline::length(&lines[0]), polyline::length(&lines[1])];
         let seam = one / (one + other);
-        let curves = |curve: fn(&SheetParameters) -> &Curve| {
-            let directed =
-                |part: JoinedPart| DirectedCurve { curve: curve(&sheets[part.sheet]), reversed: part.reversed };
-            curve_chain(parts.map(directed), seam)
-        };
-        let (flux_factor, energy_factor) = (curves(|sheet| &sheet.flux_factor), curves(|sheet| &sheet.energy_factor));
+        let directed = parts.map(|JoinedPart { sheet, reversed }| (&sheets[sheet], reversed));
+        let flux_factors = directed.map(|(sheet, reversed)| DirectedCurve { curve: &sheet.flux_factor, reversed });
+        let energy_factors = directed.map(|(sheet, reversed)| DirectedCurve { curve: &sheet.energy_factor, reversed });
+        let (flux_factor, energy_factor) = (curve_chain(flux_factors, seam), curve_chain(energy_factors, seam));
         let points = lines.concat().into_iter().map(|point| self.rounded(point)).collect();
         let joined = SheetParameters { flux_factor, energy_factor, ..with_points(&sheets[first.sheet], points) };
         sheets[first.sheet.min(second.sheet)] = joined;
@@ -350,8 +352,7 @@ fn list_edits(path: &ValuePath, old: &[SheetParameters], new: &[SheetParameters]
         // From the last to the first, so that indices stay valid.
         return Some(gone.iter().rev().map(|&index| Operation::Remove { path: path.index(index) }).collect());
     }
-    let same = |(old, new): &(&SheetParameters, &SheetParameters)| old == new;
-    let behind = old.iter().rev().zip(new.iter().rev()).take_while(same).count();
+    let behind = old.iter().rev().zip(new.iter().rev()).take_while(|(old, new)| old == new).count();
     let [kept, made] = [old.len(), new.len()].map(|count| count - behind);
     if made > kept && behind > 0 {
         return None;
@@ -384,10 +385,10 @@ fn sheet_list(sheets: &[SheetParameters]) -> Value {
 fn differences(path: &ValuePath, old: &SheetParameters, new: &SheetParameters) -> Vec<Operation> {
     let [old, new] = [non_default(old), non_default(new)];
     let keys = SheetParameters::table().parameters.iter().map(|parameter| parameter.key);
-    let change = |key: &'static str| match (old.get(key), new.get(key)) {
+    let changes = keys.filter_map(|key| match (old.get(key), new.get(key)) {
         (old, new) if old == new => None,
         (_, Some(node)) => Some(Operation::Set { path: path.key(key), value: node.value.clone() }),
         (_, None) => Some(Operation::Remove { path: path.key(key) }),
-    };
-    keys.filter_map(change).collect()
+    });
+    changes.collect()
 }

@@ -57,19 +57,18 @@ impl AuroraDrawing {
             to_length_fraction: Some(rounded(to.fraction)),
             ..link_between(from.sheet, to.sheet)
         };
-        let same_point = |own: &LinkParameters| {
-            own.from_length_fraction.zip(link.from_length_fraction).is_some_and(|(a, b)| (a - b).abs() < SAME_POINT)
-        };
-        let stays = |own: &&LinkParameters| (own.from == link.from) == (own.to == link.to) && !same_point(own);
-        let kept = self.links(shape).iter().filter(stays);
-        self.set_links(shape, kept.cloned().chain([link.clone()]).collect())
+        let mut links: Vec<LinkParameters> = self.links(shape).to_vec();
+        // A sheet is linked with one other, at as many points as there are, of which each is linked once.
+        links.retain(|other| (other.from == link.from) == (other.to == link.to) && !begin_at_same_point(other, &link));
+        links.push(link);
+        self.set_links(shape, links)
     }
 
     /// Removes the link to shape `shape` whose point arrives nearest to `near`, if one does within `radius`, km.
     pub fn unlink(&self, shape: usize, near: DVec2, radius: f64) -> Vec<Operation> {
-        let distance = |point: &LinkedPoint| point.to.distance(near);
-        let nearest = self.linked_points(shape).into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        let Some(removed) = nearest.filter(|point| distance(point) < radius) else { return Vec::new() };
+        let points = self.linked_points(shape).into_iter().map(|point| (point.to.distance(near), point));
+        let nearest = points.min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, removed)) = nearest.filter(|(distance, _)| *distance < radius) else { return Vec::new() };
         let kept = self.links(shape).iter().enumerate().filter(|(number, _)| *number != removed.link);
         self.set_links(shape, kept.map(|(_, link)| link.clone()).collect())
     }
@@ -78,15 +77,12 @@ impl AuroraDrawing {
     pub fn linked_points(&self, shape: usize) -> Vec<LinkedPoint> {
         let Some(before) = shape.checked_sub(1) else { return Vec::new() };
         let [leaving, arriving] = [before, shape].map(|shape| self.lines(shape));
-        let at = |all: &[Vec<DVec2>], sheet: i64, fraction: f64| {
-            polyline::at(all.get(usize::try_from(sheet - 1).ok()?)?, fraction)
-        };
-        let point = |(index, link): (usize, &LinkParameters)| {
-            let from = at(&leaving, link.from, link.from_length_fraction?)?;
-            let to = at(&arriving, link.to, link.to_length_fraction?)?;
+        let points = self.links(shape).iter().enumerate().filter_map(|(index, link)| {
+            let from = point_of_sheet(&leaving, link.from, link.from_length_fraction?)?;
+            let to = point_of_sheet(&arriving, link.to, link.to_length_fraction?)?;
             Some(LinkedPoint { link: index, from, to })
-        };
-        self.links(shape).iter().enumerate().filter_map(point).collect()
+        });
+        points.collect()
     }
 
     pub(super) fn links(&self, shape: usize) -> &[LinkParameters] {
@@ -119,4 +115,14 @@ fn table(link: &LinkParameters) -> Table {
         fraction.into_iter().for_each(|fraction| table.push(key, Value::Number(fraction)));
     }
     table
+}
+
+/// The point of sheet `sheet`, counted from 1 as in scenes, at a fraction of its length.
+fn point_of_sheet(lines: &[Vec<DVec2>], sheet: i64, fraction: f64) -> Option<DVec2> {
+    polyline::at(lines.get(usize::try_from(sheet - 1).ok()?)?, fraction)
+}
+
+/// Whether two links of points begin at the same one of their sheet.
+fn begin_at_same_point(a: &LinkParameters, b: &LinkParameters) -> bool {
+    a.from_length_fraction.zip(b.from_length_fraction).is_some_and(|(a, b)| (a - b).abs() < SAME_POINT)
 }

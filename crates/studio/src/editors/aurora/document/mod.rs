@@ -80,8 +80,8 @@ impl AuroraDrawing {
         let mut reader = Reader::new();
         let parameters = AuroraParameters::read_table(table, &mut reader, &[]);
         // The keys that all phenomena have are unknown to this reader.
-        let is_own = |kind: &ProblemKind| !matches!(kind, ProblemKind::UnknownKey { .. });
-        if let Some(problem) = reader.into_problems().listed.into_iter().find(|problem| is_own(&problem.kind)) {
+        let mut problems = reader.into_problems().listed.into_iter();
+        if let Some(problem) = problems.find(|problem| !matches!(problem.kind, ProblemKind::UnknownKey { .. })) {
             return Err(ShapeEditError::Invalid(problem.to_string()));
         }
         let AuroraParameters { shapes, morphing, extent_km, .. } = &parameters;
@@ -125,16 +125,13 @@ impl AuroraDrawing {
     /// The segments of the previous shape that become sheet `sheet` of shape `shape`.
     pub fn origins(&self, shape: usize, sheet: usize) -> Vec<Vec<DVec2>> {
         let all = self.lines(shape);
-        let arrives = |point_paths: &&Vec<[DVec2; 2]>| {
+        let mut strands = shape.checked_sub(1).map(|before| self.point_paths(before)).unwrap_or_default();
+        // The middle of a strand says where it arrives: its ends may be those of two sheets.
+        strands.retain(|point_paths| {
             let Some([_, middle]) = point_paths.get(point_paths.len() / 2) else { return false };
             polyline::nearest_among(&all, *middle).is_some_and(|(nearest, _)| nearest == sheet)
-        };
-        let strands = shape.checked_sub(1).map(|before| self.point_paths(before)).unwrap_or_default();
-        strands
-            .iter()
-            .filter(arrives)
-            .map(|point_paths| point_paths.iter().map(|point_path| point_path[0]).collect())
-            .collect()
+        });
+        strands.iter().map(|point_paths| point_paths.iter().map(|point_path| point_path[0]).collect()).collect()
     }
 
     /// The paths of the points of shape `shape` to the next one, km, by strand: start and end.

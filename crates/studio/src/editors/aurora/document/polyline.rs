@@ -17,20 +17,23 @@ pub struct LinePoint {
 
 /// The position on `line` that is nearest to `to`; `None` where the line has no segment.
 pub fn nearest(line: &[DVec2], to: DVec2) -> Option<LinePoint> {
-    let on = |(segment, ends): (usize, &[DVec2])| {
-        let (from, segment_vector) = (ends[0], ends[1] - ends[0]);
-        let squared = segment_vector.length_squared();
-        let fraction = if squared > 0.0 { ((to - from).dot(segment_vector) / squared).clamp(0.0, 1.0) } else { 0.0 };
-        let point = from + fraction * segment_vector;
-        LinePoint { segment, fraction, point, distance: point.distance(to) }
-    };
-    line.windows(2).enumerate().map(on).min_by(|a, b| a.distance.total_cmp(&b.distance))
+    let points = line.windows(2).enumerate().map(|(segment, ends)| nearest_on_segment(segment, [ends[0], ends[1]], to));
+    points.min_by(|a, b| a.distance.total_cmp(&b.distance))
+}
+
+/// The nearest position on segment number `segment`, between `ends`.
+fn nearest_on_segment(segment: usize, ends: [DVec2; 2], to: DVec2) -> LinePoint {
+    let (from, segment_vector) = (ends[0], ends[1] - ends[0]);
+    let squared = segment_vector.length_squared();
+    let fraction = if squared > 0.0 { ((to - from).dot(segment_vector) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    let point = from + fraction * segment_vector;
+    LinePoint { segment, fraction, point, distance: point.distance(to) }
 }
 
 /// The nearest of several lines, and the nearest position on it.
 pub fn nearest_among(all: &[Vec<DVec2>], to: DVec2) -> Option<(usize, LinePoint)> {
-    let on = |(number, line): (usize, &Vec<DVec2>)| Some((number, nearest(line, to)?));
-    all.iter().enumerate().filter_map(on).min_by(|a, b| a.1.distance.total_cmp(&b.1.distance))
+    let points = all.iter().enumerate().filter_map(|(number, line)| Some((number, nearest(line, to)?)));
+    points.min_by(|a, b| a.1.distance.total_cmp(&b.1.distance))
 }
 
 /// The point of `line` at a fraction of its length.
@@ -58,13 +61,12 @@ pub fn range(line: &[DVec2], [from, to]: [f64; 2]) -> Vec<DVec2> {
     let mut points = Vec::new();
     for ends in line.windows(2) {
         let step = ends[0].distance(ends[1]);
-        let at = |fraction: f64| ends[0].lerp(ends[1], (fraction * total - distance) / step);
-        let [starts, stops] = [from, to].map(|fraction| (distance..distance + step).contains(&(fraction * total)));
-        if starts {
-            points.push(at(from));
+        let segment = distance..distance + step;
+        if segment.contains(&(from * total)) {
+            points.push(ends[0].lerp(ends[1], (from * total - distance) / step));
         }
-        if stops && to < 1.0 {
-            points.push(at(to));
+        if segment.contains(&(to * total)) && to < 1.0 {
+            points.push(ends[0].lerp(ends[1], (to * total - distance) / step));
         }
         distance += step;
         if distance > from * total && (distance < to * total || to >= 1.0) {
@@ -82,8 +84,8 @@ pub fn simplified(points: &[DVec2], tolerance: f64) -> Vec<DVec2> {
     while let Some([first, last]) = spans.pop() {
         kept.iter_mut().skip(last).take(1).for_each(|end| *end = true);
         let chord = [points.get(first), points.get(last)].map(|end| end.copied().unwrap_or_default());
-        let off = |index: usize| nearest(&chord, points[index]).map_or(0.0, |on| on.distance);
-        let farthest = (first + 1..last).map(|index| (index, off(index))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let distances = (first + 1..last).map(|index| (index, nearest_on_segment(0, chord, points[index]).distance));
+        let farthest = distances.max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((index, _)) = farthest.filter(|(_, distance)| *distance > tolerance) {
             spans.extend([[first, index], [index, last]]);
         }
@@ -103,8 +105,11 @@ pub fn smoothed(points: &[DVec2], around: DVec2, radius: f64) -> Vec<DVec2> {
 
 /// Factors along a sheet, as [fraction, factor], increased by `by` at the fraction `at`, and linearly less up to the distance `radius`.
 pub fn brushed(factors: &[[f64; 2]], at: f64, by: f64, radius: f64) -> Vec<[f64; 2]> {
-    let weight = |fraction: f64| (1.0 - (fraction - at).abs() / radius).max(0.0);
-    factors.iter().map(|&[fraction, factor]| [fraction, lerp(factor, factor + by, weight(fraction))]).collect()
+    let brushed = factors.iter().map(|&[fraction, factor]| {
+        let weight = (1.0 - (fraction - at).abs() / radius).max(0.0);
+        [fraction, lerp(factor, factor + by, weight)]
+    });
+    brushed.collect()
 }
 
 #[cfg(test)]

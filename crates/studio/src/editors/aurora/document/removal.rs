@@ -2,7 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use bansho::{aurora::shapes::LinkParameters, scene::operation::Operation};
+use bansho::{
+    aurora::shapes::{LinkParameters, SplitParameters},
+    scene::operation::Operation,
+};
 
 use super::{AuroraDrawing, changes::RemappedSheets, polyline, renumber::SheetRemap};
 
@@ -38,11 +41,10 @@ impl AuroraDrawing {
                 RemappedSheets { sheets, remap: SheetRemap::Removed(gone[shape].clone()) }
             })
             .collect();
-        let needless = |shape: usize| match shape.checked_sub(1) {
+        self.write_all(first, &changed, LinkParameters::clone, |shape| match shape.checked_sub(1) {
             Some(before) => self.needless_splits(shape, &strands[before], [&gone[before], &gone[shape]]),
             None => Vec::new(),
-        };
-        self.write_all(first, &changed, LinkParameters::clone, needless)
+        })
     }
 
     /// The strands from shape `before` to the next, in the order of its sheets and along each.
@@ -64,31 +66,36 @@ impl AuroraDrawing {
     fn needless_splits(&self, shape: usize, strands: &[Strand], [before, after]: [&BTreeSet<usize>; 2]) -> Vec<usize> {
         let Some(parameters) = self.parameters.shapes.get(shape) else { return Vec::new() };
         let staying = strands.iter().map(|strand| strand.from).filter(|from| !before.contains(from));
-        let of_sheet = |sheet: usize| {
-            let splits = parameters.split.iter().enumerate();
-            let mut cuts: Vec<usize> =
-                splits.filter(|(_, split)| split.sheet == sheet as i64 + 1).map(|(number, _)| number).collect();
-            let position = |number: usize| {
-                (parameters.split[number].segment, parameters.split[number].length_fraction.unwrap_or(0.5))
-            };
-            cuts.sort_by(|&a, &b| {
-                let (a, b) = (position(a), position(b));
-                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-            });
-            let parts = strands.iter().filter(move |strand| strand.from == sheet);
-            let parts = parts.map(|strand| after.contains(&strand.to));
+        let mut needless = Vec::new();
+        for sheet in staying.collect::<BTreeSet<_>>() {
+            let cuts = cuts_along(&parameters.split, sheet);
+            let parts = strands.iter().filter(|strand| strand.from == sheet).enumerate();
             // Each part but the first begins at a cut.
-            let gone = parts.enumerate().filter(|(_, gone)| *gone).map(|(part, _)| part.saturating_sub(1));
-            let numbers: Vec<usize> = gone.filter_map(|cut| cuts.get(cut).copied()).collect();
-            numbers
-        };
-        staying.collect::<BTreeSet<_>>().into_iter().flat_map(of_sheet).collect()
+            let gone = parts.filter(|(_, strand)| after.contains(&strand.to)).map(|(part, _)| part.saturating_sub(1));
+            needless.extend(gone.filter_map(|cut| cuts.get(cut).copied()));
+        }
+        needless
     }
+}
+
+/// The numbers of the splits of sheet `sheet`, from its beginning to its end.
+fn cuts_along(splits: &[SplitParameters], sheet: usize) -> Vec<usize> {
+    let of_sheet = splits.iter().enumerate().filter(|(_, split)| split.sheet == sheet as i64 + 1);
+    let mut cuts: Vec<(usize, &SplitParameters)> = of_sheet.collect();
+    cuts.sort_by(|(_, a), (_, b)| {
+        let [at_a, at_b] = [a, b].map(|split| split.length_fraction.unwrap_or(0.5));
+        a.segment.cmp(&b.segment).then(at_a.total_cmp(&at_b))
+    });
+    cuts.into_iter().map(|(number, _)| number).collect()
 }
 
 /// The sheets that strands reach from the sheets `gone` and from no others.
 fn reached_only_from(strands: &[Strand], gone: &BTreeSet<usize>) -> BTreeSet<usize> {
-    let stays = |sheet: usize| strands.iter().any(|strand| strand.to == sheet && !gone.contains(&strand.from));
-    let reached = strands.iter().filter(|strand| gone.contains(&strand.from) && !stays(strand.to));
-    reached.map(|strand| strand.to).collect()
+    let (from_gone, others): (Vec<&Strand>, Vec<&Strand>) =
+        strands.iter().partition(|strand| gone.contains(&strand.from));
+    let mut reached: BTreeSet<usize> = from_gone.into_iter().map(|strand| strand.to).collect();
+    for strand in others {
+        reached.remove(&strand.to);
+    }
+    reached
 }

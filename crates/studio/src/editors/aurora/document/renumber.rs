@@ -169,12 +169,16 @@ fn split_table(split: &SplitParameters) -> Table {
     table
 }
 
+/// A list of two whole numbers.
+pub(super) fn integers(numbers: [i64; 2]) -> Value {
+    Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into())
+}
+
 fn merge_table(merge: &MergeParameters) -> Table {
-    let whole = |numbers: [i64; 2]| Value::List(numbers.map(|number| Node::from(Value::Integer(number))).into());
     let mut table = Table::default();
-    table.push("sheets", whole(merge.sheets));
+    table.push("sheets", integers(merge.sheets));
     if let Auto::Set(ends) = merge.ends {
-        table.push("ends", whole(ends.map(|end| end as i64)));
+        table.push("ends", integers(ends.map(|end| end as i64)));
     }
     table
 }

@@ -73,14 +73,15 @@ impl AuroraDrawing {
         if stated.len() == lines.len() {
             return stated;
         }
-        let entry = |(sheet, line): (usize, &Vec<DVec2>)| {
-            let along = |factor| along(line, &self.factors(shape, sheet, factor));
-            let [flux_factor, energy_factor] = [Factor::Flux, Factor::Energy].map(along);
+        let mut sheets = Vec::with_capacity(lines.len());
+        for (sheet, line) in lines.iter().enumerate() {
+            let [flux_factor, energy_factor] =
+                [Factor::Flux, Factor::Energy].map(|factor| along(line, &self.factors(shape, sheet, factor)));
             // The evaluated factors include the taper of the ends.
             let plain = with_points(&SheetParameters::default(), self.simplified_points(line));
-            SheetParameters { flux_factor, energy_factor, end_taper: 0.0, ..plain }
-        };
-        lines.iter().enumerate().map(entry).collect()
+            sheets.push(SheetParameters { flux_factor, energy_factor, end_taper: 0.0, ..plain });
+        }
+        sheets
     }
 }
 
@@ -105,21 +106,25 @@ fn along(line: &[DVec2], values: &[f64]) -> Curve {
             Curve::new(constant, default.interpolation()).unwrap_or(default)
         };
     }
-    // The interpolated curve may overshoot between few points; finer tolerances follow then.
-    let with = |tolerance: f64| {
+    // The interpolated curve may overshoot between few points; finer tolerances follow then, and the last curve is taken in any case.
+    let mut curve = None;
+    for tolerance in [TOLERANCE, 0.3 * TOLERANCE, 0.1 * TOLERANCE, 0.0] {
         let kept = polyline::simplified(&points, tolerance).into_iter().map(|point| point.to_array().map(rounded));
-        Curve::new(kept.collect(), default.interpolation()).ok()
-    };
-    let is_near = |curve: &Curve| points.iter().all(|point| (curve.eval(point.x) - point.y).abs() < 2.0 * TOLERANCE);
-    let curves = [TOLERANCE, 0.3 * TOLERANCE, 0.1 * TOLERANCE, 0.0].into_iter().filter_map(with);
-    let found = curves.reduce(|best, finer| if is_near(&best) { best } else { finer });
-    found.unwrap_or(default)
+        let Ok(finer) = Curve::new(kept.collect(), default.interpolation()) else { continue };
+        let is_near = points.iter().all(|point| (finer.eval(point.x) - point.y).abs() < 2.0 * TOLERANCE);
+        curve = Some(finer);
+        if is_near {
+            break;
+        }
+    }
+    curve.unwrap_or(default)
 }
 
 /// Whether `sheet` has no transform.
 fn is_plain(sheet: &SheetParameters) -> bool {
-    let transform = |sheet: &SheetParameters| (sheet.position_km, sheet.rotation_deg, sheet.scale, sheet.mirror);
-    transform(sheet) == transform(&SheetParameters::default())
+    let default = SheetParameters::default();
+    (sheet.position_km, sheet.rotation_deg) == (default.position_km, default.rotation_deg)
+        && (sheet.scale, sheet.mirror) == (default.scale, default.mirror)
 }
 
 /// `sheet` with a stroke through `points`.
@@ -189,9 +194,11 @@ pub(super) fn curve_chain(parts: [DirectedCurve; 2], fraction: f64) -> Curve {
 
 /// The curve with control points at both ends.
 pub(super) fn sampled(curve: &Curve) -> Curve {
-    let value = |at: f64| [at, curve.eval(at)];
-    let ends = Curve::new(vec![value(0.0), value(1.0)], curve.interpolation()).unwrap_or_else(|_| curve.clone());
-    if curve.points().len() < 2 { ends } else { curve.clone() }
+    if curve.points().len() >= 2 {
+        return curve.clone();
+    }
+    let ends = [0.0, 1.0].map(|at| [at, curve.eval(at)]);
+    Curve::new(ends.into(), curve.interpolation()).unwrap_or_else(|_| curve.clone())
 }
 
 /// The keys of `parameters` that differ from the defaults.

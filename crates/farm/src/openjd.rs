@@ -4,19 +4,19 @@
 
 use std::{fmt::Write, path::Path};
 
-use bansho_media::files::provenance::COMMENT_LINE;
+use bansho::media::files::provenance::COMMENT_LINE;
 use serde_json::Value;
 
-use super::{error::FarmError, products::Products, task::script_path};
+use super::{
+    error::FarmError,
+    products::Products,
+    task::{NO_MORE_SNAPSHOTS, check_printable, requested_memory_mib, script_path},
+};
 
 /// Revision of the specification.
 const SPECIFICATION: &str = "jobtemplate-2023-09";
 /// Longest name of a job that the specification allows, characters.
 const MAX_NAME: usize = 128;
-/// Snapshots at the beginning of chunks only: this interval is never reached after the first frame.
-const NO_MORE_SNAPSHOTS: i64 = i64::MAX;
-/// Factor from the estimated to the requested memory, and what is added to it, MiB.
-const MEMORY_HEADROOM: (f64, f64) = (1.5, 256.0);
 
 /// What a template is made of. The values are the defaults of its parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +72,7 @@ fn literal(text: &str) -> Result<String, FarmError> {
     if text.contains("{{") || text.contains("}}") {
         return Err(FarmError::Braces { text: text.to_owned() });
     }
-    super::task::check_printable(text)?;
+    check_printable(text)?;
     Ok(quoted(text))
 }
 
@@ -114,11 +114,10 @@ impl Template {
             let key = if index == 0 { "    dependencies:\n" } else { "" };
             let _ = writeln!(self.text, "{key}      - dependsOn: {after}");
         }
-        let (factor, extra) = MEMORY_HEADROOM;
         let _ = write!(
             self.text,
             "    hostRequirements:\n      amounts:\n        - name: amount.worker.memory\n          min: {}\n{}{}    script:\n      actions:\n        onRun:\n",
-            (factor * step.memory_bytes / f64::from(1 << 20) + extra).ceil() as u64,
+            requested_memory_mib(step.memory_bytes),
             step.space,
             step.environment,
         );
@@ -281,7 +280,7 @@ fn in_output_folder(path: &Path) -> Result<String, FarmError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::farm::products::FlipbookRequest;
+    use crate::products::FlipbookRequest;
 
     fn options() -> TemplateOptions {
         TemplateOptions {

@@ -2,40 +2,35 @@
 
 use std::{io, path::PathBuf, sync::Arc};
 
-use bansho_base::host::{assets::MemoryAssets, observer::Observer};
-use bansho_media::files::{
-    atomic,
-    input::{self, InputError},
-    overwrite_policy::OverwritePolicy,
-    provenance::{COMMENT_LINE, PROGRAM},
+use bansho::{
+    MemoryAssets, Observer, Plan, PlanOptions, Shot, compile_scene,
+    job::JobError,
+    media::files::{
+        atomic,
+        input::{self, InputError},
+        overwrite_policy::OverwritePolicy,
+        provenance::{COMMENT_LINE, PROGRAM},
+    },
 };
-use bansho_render::{Plan, PlanOptions, Shot};
 
 use super::{
     error::FarmError,
     plan::{FarmFolder, FarmPlan},
 };
-use crate::{compile_scene, job::JobError};
 
 /// Largest token file that is read, bytes.
 const TOKEN_BYTES: u64 = 256;
 /// Largest record of a machine that is read, bytes.
 const RECORD_BYTES: u64 = 1024;
 
-/// A picture that passes through the arithmetic of every kind of phenomenon, small enough to be drawn by every task.
+/// The head of pictures that pass through the arithmetic of every kind of phenomenon, small enough to be drawn by every task.
 const PICTURE: &str = "bansho = 2\n[picture]\nsize = [48, 32]\nseed = 11\n";
-#[cfg(feature = "fire")]
-const FIRE: &str = "[[flame_sheet]]\n[[flame_particles]]\nparticles = 100\npreroll_s = 0.05\n";
-#[cfg(not(feature = "fire"))]
-const FIRE: &str = "";
-#[cfg(feature = "rain")]
-const RAIN: &str = "[[rain]]\nrate_mm_per_h = 10\n";
-#[cfg(not(feature = "rain"))]
-const RAIN: &str = "";
-#[cfg(feature = "aurora")]
-const AURORA: &str = "[[aurora]]\npreroll_s = 0.05\nparticles = { count = 500 }\nfield = { cells = 31 }\n";
-#[cfg(not(feature = "aurora"))]
-const AURORA: &str = "";
+/// The phenomena, one picture each: an aurora would outshine the others.
+const PHENOMENA: [&str; 3] = [
+    "[[flame_sheet]]\n[[flame_particles]]\nparticles = 100\npreroll_s = 0.05\n",
+    "[[rain]]\nrate_mm_per_h = 10\n",
+    "[[aurora]]\npreroll_s = 0.05\nparticles = { count = 500 }\nfield = { cells = 31 }\n",
+];
 
 /// Hexadecimal digest of the floats of a small picture of every kind of phenomenon. Machines with the same digest are expected to draw the same bytes.
 ///
@@ -43,13 +38,12 @@ const AURORA: &str = "";
 /// The observer canceled it.
 pub fn arithmetic_digest(observer: &dyn Observer) -> Result<String, FarmError> {
     let mut hasher = blake3::Hasher::new();
-    // One after the other: an aurora outshines the others.
-    for kind in [FIRE, RAIN, AURORA].iter().filter(|kind| !kind.is_empty()) {
-        let scene = format!("{PICTURE}{kind}");
+    for phenomenon in PHENOMENA {
+        let scene = format!("{PICTURE}{phenomenon}");
         let compiled = compile_scene("arithmetic", &scene, Arc::new(MemoryAssets::default()))
             .map_err(|error| JobError::Scene(Box::new(error)))?;
         let plan = Plan::new(&compiled, &PlanOptions::default()).map_err(JobError::Plan)?;
-        let frame = crate::draw(&mut Shot::open(compiled, Arc::new(plan)), 1, observer).map_err(JobError::from)?;
+        let frame = bansho::draw(&mut Shot::open(compiled, Arc::new(plan)), 1, observer).map_err(JobError::from)?;
         for value in frame.beauty.pixels().as_flattened() {
             hasher.update(&value.to_bits().to_le_bytes());
         }
@@ -140,9 +134,9 @@ impl TaskCheck<'_> {
 
     /// Whether a task of this plan has already found that this machine may work on it. The picture takes more time than all else before the first frame.
     fn is_recorded(&self, plan: &FarmPlan) -> bool {
-        let is_this =
-            |path| input::read(path, RECORD_BYTES).is_ok_and(|found| found == Self::record_of(plan).as_bytes());
-        plan.program == PROGRAM && self.record_path().as_deref().is_some_and(is_this)
+        // Whatever the record says, this program draws no frames of another version.
+        let Some(path) = self.record_path().filter(|_| plan.program == PROGRAM) else { return false };
+        input::read(&path, RECORD_BYTES).is_ok_and(|record| record == Self::record_of(plan).as_bytes())
     }
 
     fn record(&self, plan: &FarmPlan) {
@@ -156,13 +150,25 @@ impl TaskCheck<'_> {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::{
-        host::observer::Unobserved,
-        math::simd::{VectorLevel, set_vector_level},
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use bansho::{
+        Stage, Unobserved,
+        base::math::simd::{VectorLevel, set_vector_level},
     };
 
     use super::*;
-    use crate::farm::plan::tests::plan;
+    use crate::plan::tests::plan;
+
+    /// Notes whether any stage of drawing began.
+    #[derive(Default)]
+    struct DrawingObserver(AtomicBool);
+
+    impl Observer for DrawingObserver {
+        fn begin(&self, _stage: Stage) {
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
 
     #[test]
     fn the_digest_does_not_depend_on_the_width_of_vectors() {
@@ -196,8 +202,6 @@ mod tests {
         assert!(matches!(check.plan(&Unobserved), Err(FarmError::Arithmetic)));
     }
 
-    // Without a phenomenon there is no picture.
-    #[cfg(feature = "fire")]
     #[test]
     fn a_machine_draws_the_picture_once_for_a_plan() {
         let root = tempfile::tempdir().unwrap();
@@ -205,9 +209,9 @@ mod tests {
         let good = FarmPlan { arithmetic: arithmetic_digest(&Unobserved).unwrap(), ..plan() };
         folder.write_plan(&good, &OverwritePolicy::default()).unwrap();
         let draws = |token: &str, machine: Option<&str>| {
-            let observer = crate::job::testing::RecordingObserver::default();
+            let observer = DrawingObserver::default();
             TaskCheck { folder: &folder, token, machine }.plan(&observer).unwrap();
-            observer.stages.into_inner() > 0
+            observer.0.into_inner()
         };
         assert!(draws("0123", Some("a-1")));
         assert!(!draws("0123", Some("a-1")));

@@ -5,21 +5,23 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bansho_media::files::{
-    atomic,
-    input::{self, InputError},
-    naming::OutputPattern,
-    overwrite_policy::OverwritePolicy,
-    provenance::{COMMENT_LINE, PROGRAM},
+use bansho::{
+    job::frames,
+    media::files::{
+        atomic,
+        input::{self, InputError},
+        overwrite_policy::OverwritePolicy,
+        provenance::{COMMENT_LINE, PROGRAM},
+    },
 };
 use serde::{Deserialize, Serialize};
 
 use super::{
-    chunks::{ChunkGrid, ShotCosts},
+    chunks::ChunkGrid,
+    costs::ShotCosts,
     error::FarmError,
-    products::Products,
+    products::{Products, shot_stem},
 };
-use crate::job::frames;
 
 /// Value of `"format"` in the file of a plan.
 const FORMAT: u32 = 2;
@@ -35,7 +37,7 @@ const SCRIPT_NAMES: [&str; 5] = ["check.sbatch", "snapshots.sbatch", "frames.sba
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Script {
     /// Its name: `check.sbatch`, `snapshots.sbatch`, `frames.sbatch`, `finish.sbatch` or `submit.sh`.
-    pub name: &'static str,
+    pub name: String,
     /// Its text.
     pub text: String,
 }
@@ -147,18 +149,6 @@ impl FarmPlan {
     }
 }
 
-/// The name of the shot whose frames are at `output`.
-pub(crate) fn shot_stem(output: &Path) -> String {
-    match OutputPattern::parse(output, 2) {
-        Ok(pattern) => pattern.stem().to_owned(),
-        // What uses the name has reported it.
-        Err(_) => {
-            let name = output.file_name().unwrap_or_default().to_string_lossy();
-            name.chars().take_while(|c| !matches!(c, '.' | '#' | '%')).collect()
-        }
-    }
-}
-
 /// The folder of a plan, beside the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FarmFolder {
@@ -243,7 +233,7 @@ impl FarmFolder {
     /// It cannot be written, or something else has its name.
     pub fn write_script(&self, script: &Script, policy: &OverwritePolicy) -> Result<(), FarmError> {
         let policy = policy.clone().without_links();
-        Ok(atomic::write_bytes(&self.root.join(script.name), script.text.as_bytes(), &policy)?)
+        Ok(atomic::write_bytes(&self.root.join(&script.name), script.text.as_bytes(), &policy)?)
     }
 
     /// Leaves the token of a template of Open Job Description.
@@ -355,7 +345,7 @@ pub(crate) mod tests {
         assert_eq!(read, plan());
         assert_eq!((read.grid().unwrap().chunk(2), read.task_count()), (&[8, 9][..], 3));
         for file in [farm.plan(), farm.token()] {
-            assert!(bansho_media::files::provenance::is_bansho_file(&file), "{}", file.display());
+            assert!(bansho::media::files::provenance::is_bansho_file(&file), "{}", file.display());
         }
     }
 

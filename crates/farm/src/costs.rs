@@ -1,26 +1,87 @@
-//! What a frame costs, measured by drawing a few frames of the shot. They are frames like all others, and kept.
+//! What a shot costs: the time of a frame, measured by drawing a few frames of the shot, and the room of its files on the disk.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::{
+    path::Path,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
 
-use bansho_base::host::observer::{Observer, Stage, StagePart};
+use bansho::{
+    Observer, Stage, StagePart,
+    job::{FrameDone, JobObserver, JobStarted, Warning},
+};
+use serde::{Deserialize, Serialize};
 
-use super::chunks::ShotCosts;
-use crate::job::{FrameDone, JobObserver, JobStarted, Warning};
+use super::error::FarmError;
 
-/// Number of frames that are drawn.
-const FRAMES: usize = 4;
-/// Frames between them where frames between must be stepped.
+/// Costs of a shot on one machine, measured or estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ShotCosts {
+    /// Time from the start of the program to the first frame, s: reading the scene, building it, and the preroll of simulations.
+    pub startup_s: f64,
+    /// Time to step over a frame without drawing it, s; 0 where nothing is simulated.
+    pub step_s: f64,
+    /// Time to draw and write a frame, s, without stepping.
+    pub draw_s: f64,
+    /// Size of the file of a frame, bytes.
+    pub frame_bytes: u64,
+    /// Size of a snapshot, bytes; 0 where nothing is simulated.
+    pub snapshot_bytes: u64,
+}
+
+/// Factor from the size of the frames that were measured to that of all: some are harder to compress.
+const SIZE_HEADROOM: f64 = 1.2;
+
+impl ShotCosts {
+    /// Time of a frame that follows the one before it, s.
+    pub fn frame_s(&self) -> f64 {
+        self.step_s + self.draw_s
+    }
+
+    /// Bytes that this number of frames and snapshots will take.
+    pub fn required_bytes(&self, frames: u64, snapshots: u64) -> u64 {
+        let bytes = self.frame_bytes as f64 * frames as f64 + self.snapshot_bytes as f64 * snapshots as f64;
+        (SIZE_HEADROOM * bytes) as u64
+    }
+}
+
+/// Checks that `required` bytes fit into `folder`, where `available` bytes are free. Nothing is checked where that is unknown.
+///
+/// # Errors
+/// They do not fit.
+pub fn check_space(folder: &Path, required: u64, available: Option<u64>) -> Result<(), FarmError> {
+    match available {
+        Some(available) if available < required => Err(FarmError::Space {
+            path: folder.to_path_buf(),
+            required: in_words(required),
+            available: in_words(available),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// A number of bytes in words.
+fn in_words(bytes: u64) -> String {
+    const UNITS: [(&str, f64); 4] = [("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)];
+    let bytes = bytes as f64;
+    let unit = UNITS.into_iter().find(|(_, size)| bytes >= *size);
+    unit.map_or_else(|| format!("{bytes} bytes"), |(unit, size)| format!("{:.1} {unit}", bytes / size))
+}
+
+/// Number of frames that are drawn to measure them.
+const PROBES: usize = 4;
+/// Frames from one of them to the next where the frames between must be stepped.
 const STEPPED_SPACING: usize = 8;
 
-/// The frames to draw: spread over the shot where each can be drawn alone, else close to its beginning.
-pub fn frames(all: &[i64], is_stepped: bool) -> Vec<i64> {
-    let count = FRAMES.min(all.len());
+/// The frames to measure: spread over the shot where each can be drawn alone, else close to its beginning, since the steps to a late frame would take as
+/// long as the shot. They are frames like all others, and kept.
+pub fn probe_frames(all: &[i64], is_stepped: bool) -> Vec<i64> {
+    let count = PROBES.min(all.len());
     let last = all.len().saturating_sub(1);
-    let index = |probe: usize| match is_stepped {
-        true => (probe * STEPPED_SPACING).min(last),
-        false => probe * last / (count - 1).max(1),
-    };
-    let mut frames: Vec<i64> = (0..count).map(|probe| all[index(probe)]).collect();
+    let mut frames = Vec::with_capacity(count);
+    for probe in 0..count {
+        let index = if is_stepped { (probe * STEPPED_SPACING).min(last) } else { probe * last / (count - 1).max(1) };
+        frames.push(all[index]);
+    }
     frames.dedup();
     frames
 }
@@ -87,6 +148,7 @@ impl Observer for ProbeObserver<'_> {
         let mut times = self.times();
         match stage {
             Stage::Advance => {
+                // Steps before the first frame are the preroll, which is part of the startup.
                 let since = times.advance_since.take();
                 if let Some(since) = since.filter(|_| times.first_drawn.is_some()) {
                     times.steps_s += (self.clock)() - since;
@@ -136,18 +198,18 @@ impl JobObserver for ProbeObserver<'_> {
 mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    use bansho_base::host::observer::Unobserved;
+    use bansho::Unobserved;
 
     use super::*;
 
     #[test]
     fn frames_are_spread_over_the_shot_unless_it_is_stepped() {
         let all: Vec<i64> = (100..200).collect();
-        assert_eq!(frames(&all, false), [100, 133, 166, 199]);
-        assert_eq!(frames(&all, true), [100, 108, 116, 124]);
-        assert_eq!(frames(&all[..2], false), [100, 101]);
-        assert_eq!(frames(&all[..5], true), [100, 104]);
-        assert_eq!((frames(&all[..1], true), frames(&[], false)), (vec![100], vec![]));
+        assert_eq!(probe_frames(&all, false), [100, 133, 166, 199]);
+        assert_eq!(probe_frames(&all, true), [100, 108, 116, 124]);
+        assert_eq!(probe_frames(&all[..2], false), [100, 101]);
+        assert_eq!(probe_frames(&all[..5], true), [100, 104]);
+        assert_eq!((probe_frames(&all[..1], true), probe_frames(&[], false)), (vec![100], vec![]));
     }
 
     #[test]
@@ -170,5 +232,17 @@ mod tests {
         let costs = probe.costs(&[0, 8, 16]).unwrap();
         assert_eq!((costs.startup_s, costs.step_s, costs.draw_s), (55.0, 2.0, 10.0));
         assert_eq!(probe.costs(&[0, 8, 16, 24]), None, "one was not drawn");
+    }
+
+    #[test]
+    fn a_show_that_does_not_fit_is_refused_in_words() {
+        let costs = ShotCosts { frame_bytes: 50_000_000, snapshot_bytes: 5_000_000, ..ShotCosts::default() };
+        let required = costs.required_bytes(108_000, 100);
+        assert_eq!(required, 6_480_600_000_000);
+        check_space(Path::new("a"), required, Some(required)).unwrap();
+        check_space(Path::new("a"), required, None).unwrap();
+        let error = check_space(Path::new("a"), required, Some(900_000_000)).unwrap_err().to_string();
+        assert_eq!(error, "a: the frames will take about 6.5 TB, and 900.0 MB are free");
+        assert_eq!(in_words(999), "999 bytes");
     }
 }

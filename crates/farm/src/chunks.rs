@@ -1,30 +1,6 @@
 //! Cuts the frames of a shot into chunks, one task of a batch system each.
 
-use serde::{Deserialize, Serialize};
-
-use super::error::FarmError;
-
-/// Costs of a shot on one machine, measured or estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ShotCosts {
-    /// Time from the start of the program to the first frame, s: reading the scene, building it, and the preroll of simulations.
-    pub startup_s: f64,
-    /// Time to step over a frame without drawing it, s; 0 where nothing is simulated.
-    pub step_s: f64,
-    /// Time to draw and write a frame, s, without stepping.
-    pub draw_s: f64,
-    /// Size of the file of a frame, bytes.
-    pub frame_bytes: u64,
-    /// Size of a snapshot, bytes; 0 where nothing is simulated.
-    pub snapshot_bytes: u64,
-}
-
-impl ShotCosts {
-    /// Time of a frame that follows the one before it, s.
-    pub fn frame_s(&self) -> f64 {
-        self.step_s + self.draw_s
-    }
-}
+use super::{costs::ShotCosts, error::FarmError};
 
 /// Frames cut at every multiple of a fixed number, counted from the first frame of the scene. Which chunk a frame is in does not depend on which frames
 /// exist already, so that chunks keep their numbers when the rest is submitted again.
@@ -41,10 +17,14 @@ impl ChunkGrid {
         Self { first_frame, chunk_frames: chunk_frames.max(1), frames }
     }
 
+    /// The length of a chunk. One longer than any shot is the whole shot.
+    fn length(&self) -> i64 {
+        i64::try_from(self.chunk_frames).unwrap_or(i64::MAX)
+    }
+
+    /// Which multiple of the length `frame` is in, counted from the first frame of the scene; frames before it have negative numbers.
     fn block(&self, frame: i64) -> i64 {
-        // A chunk longer than any shot is the whole shot.
-        let length = i64::try_from(self.chunk_frames).unwrap_or(i64::MAX);
-        frame.saturating_sub(self.first_frame).div_euclid(length)
+        frame.saturating_sub(self.first_frame).div_euclid(self.length())
     }
 
     /// Number of chunks, those without any frame included.
@@ -67,8 +47,7 @@ impl ChunkGrid {
     /// The frame at which chunk `index` is cut, whether it is drawn or not.
     pub fn start(&self, index: usize) -> Option<i64> {
         let frame = self.chunk(index).first()?;
-        let length = i64::try_from(self.chunk_frames).unwrap_or(i64::MAX);
-        Some(self.first_frame.saturating_add(self.block(*frame).saturating_mul(length)))
+        Some(self.first_frame.saturating_add(self.block(*frame).saturating_mul(self.length())))
     }
 
     /// All frames.
@@ -113,14 +92,19 @@ pub fn chunk_frames(frames: &[i64], costs: &ShotCosts, request: &ChunkRequest) -
     let max_chunks = max_chunks(request)?;
     let (first, last) = (frames.first().copied().unwrap_or(0), frames.last().copied().unwrap_or(0));
     let span = last.abs_diff(first) + 1;
-    // A chunk is cut at multiples, so one more may be needed than the span has.
-    let least = if max_chunks == 1 { span } else { span.div_ceil(max_chunks - 1) };
     // Frames of every tenth number are apart by ten.
     let spacing = span as f64 / frames.len().max(1) as f64;
     let wanted = (request.task_s - costs.startup_s).max(0.0) / costs.frame_s().max(1e-6) * spacing;
-    Ok((wanted as u64).clamp(1, span.max(1)).max(least))
+    Ok((wanted as u64).clamp(1, span.max(1)).max(least_chunk_frames(span, max_chunks)))
 }
 
+/// The shortest chunk by which a shot of `span` frames is cut into up to `max_chunks`. Chunks are cut at multiples from the first frame of the scene, so that
+/// both ends of the shot may be parts of a chunk: one more may be needed than the span has.
+fn least_chunk_frames(span: u64, max_chunks: u64) -> u64 {
+    if max_chunks == 1 { span } else { span.div_ceil(max_chunks - 1) }
+}
+
+/// The number of chunks of which each may be as many tasks as there are tiles.
 fn max_chunks(request: &ChunkRequest) -> Result<u64, FarmError> {
     let (tiles, max) = (request.tiles, request.max_tasks);
     if tiles > max { Err(FarmError::TooManyTiles { tiles, max }) } else { Ok((max / tiles.max(1)) as u64) }
@@ -138,8 +122,8 @@ pub fn check_task_count(grid: &ChunkGrid, request: &ChunkRequest) -> Result<(), 
     }
     let frames = grid.frames();
     let span = frames[frames.len() - 1].abs_diff(frames[0]) + 1;
-    let least = if max_chunks == 1 { span } else { span.div_ceil(max_chunks - 1) };
-    Err(FarmError::TooManyTasks { tasks, max: request.max_tasks, least_chunk: least })
+    let least_chunk = least_chunk_frames(span, max_chunks);
+    Err(FarmError::TooManyTasks { tasks, max: request.max_tasks, least_chunk })
 }
 
 #[cfg(test)]

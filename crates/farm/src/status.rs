@@ -3,18 +3,17 @@
 
 use std::path::PathBuf;
 
+use bansho::job::{FrameState, Job};
 use serde::Serialize;
 
 use super::{
     chunks::ChunkGrid,
     error::FarmError,
-    film,
     journal::{self, Attempt, Attempts},
     plan::{FarmFolder, FarmPlan},
-    queue::{Queue, QueueState},
+    slurm::{Queue, QueueState},
     task,
 };
-use crate::job::{FrameState, Job};
 
 /// Numbers of frames by the state of their files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -32,10 +31,17 @@ pub struct FrameCounts {
 impl FrameCounts {
     /// Counts states.
     pub fn of(states: &[FrameState]) -> Self {
-        let count = |state| states.iter().filter(|&&found| found == state).count();
-        let [whole, missing, stale, damaged] =
-            [FrameState::Whole, FrameState::Missing, FrameState::Stale, FrameState::Damaged].map(count);
-        Self { whole, missing, stale, damaged }
+        let mut counts = Self::default();
+        for state in states {
+            let count = match state {
+                FrameState::Whole => &mut counts.whole,
+                FrameState::Missing => &mut counts.missing,
+                FrameState::Stale => &mut counts.stale,
+                FrameState::Damaged => &mut counts.damaged,
+            };
+            *count += 1;
+        }
+        counts
     }
 
     /// Number of frames.
@@ -194,10 +200,11 @@ pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan, queue: Option<&Qu
         // Tiles count only when they are joined.
         _ => FrameCounts::of(&whole_job.prepare()?.frame_states()),
     };
-    let task = |(task, states): (usize, &Vec<FrameState>)| {
+    let mut tasks = Vec::with_capacity(states.len());
+    for (task, states) in states.iter().enumerate() {
         let (chunk, frames) = (grid.chunk(task / tiles), FrameCounts::of(states));
         let attempts = attempts.get(&journal::task_name(task)).cloned().unwrap_or_default();
-        TaskStatus {
+        tasks.push(TaskStatus {
             task,
             first: chunk.first().copied().unwrap_or(0),
             last: chunk.last().copied().unwrap_or(0),
@@ -205,11 +212,10 @@ pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan, queue: Option<&Qu
             state: task_state(&frames, attempts.last(), plan, queue.map(|queue| queue.task(task))),
             frames,
             attempts,
-        }
-    };
-    let tasks: Vec<TaskStatus> = states.iter().enumerate().map(task).collect();
+        });
+    }
     let finish = finish_status(&attempts, &tasks, plan, queue);
-    let made = film::paths(&plan.products, &whole_job, &plan.folder)?.into_iter();
+    let made = plan.products.paths(&whole_job, &plan.folder)?.into_iter();
     // What is there from before is of other frames, perhaps.
     let unmade = made.filter(|path| finish != FinishStatus::Done || !path.is_file()).collect();
     let seconds_per_frame = seconds_per_frame(&tasks);
@@ -219,10 +225,13 @@ pub fn status(job: &Job, folder: &FarmFolder, plan: &FarmPlan, queue: Option<&Qu
     Ok(FarmStatus { frames, tasks, finish, asked: queue.is_some(), unmade, seconds_per_frame, running, seconds_left })
 }
 
+/// The mean time of a frame over all attempts that drew any, s: startup and steps of their tasks are part of it.
 fn seconds_per_frame(tasks: &[TaskStatus]) -> Option<f64> {
-    let attempts = || tasks.iter().flat_map(|task| &task.attempts).filter(|attempt| attempt.drawn > 0);
-    let drawn: usize = attempts().map(|attempt| attempt.drawn).sum();
-    let seconds: f64 = attempts().map(|attempt| attempt.seconds).sum();
+    let (mut drawn, mut seconds) = (0, 0.0);
+    for attempt in tasks.iter().flat_map(|task| &task.attempts).filter(|attempt| attempt.drawn > 0) {
+        drawn += attempt.drawn;
+        seconds += attempt.seconds;
+    }
     (drawn > 0).then(|| seconds / drawn as f64)
 }
 
@@ -252,9 +261,13 @@ fn failure(attempt: Option<&Attempt>, plan: &FarmPlan) -> Option<String> {
     Some(format!("exit code {code} on {}: {}", attempt.node, attempt.message.as_deref().unwrap_or("no message")))
 }
 
+/// The last attempt at what `name` is about.
+fn last_attempt<'a>(attempts: &'a Attempts, name: &str) -> Option<&'a Attempt> {
+    attempts.get(name).and_then(|attempts| attempts.last())
+}
+
 fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan, queue: Option<&Queue>) -> FinishStatus {
-    let last = |name: &str| attempts.get(name).and_then(|attempts| attempts.last());
-    let finish = last("finish").filter(|attempt| attempt.token == plan.token);
+    let finish = last_attempt(attempts, "finish").filter(|attempt| attempt.token == plan.token);
     match (finish.and_then(|finish| finish.code), failure(finish, plan)) {
         (Some(0), _) => return FinishStatus::Done,
         (_, Some(message)) => return FinishStatus::Failed { message },
@@ -263,7 +276,8 @@ fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan, que
     // The check runs on many machines at once, of which one may fail.
     let checks = attempts.get("check").into_iter().flatten();
     let check = checks.filter_map(|attempt| failure(Some(attempt), plan)).next();
-    let before = [("check".to_owned(), check), ("snapshots".to_owned(), failure(last("snapshots"), plan))];
+    let before =
+        [("check".to_owned(), check), ("snapshots".to_owned(), failure(last_attempt(attempts, "snapshots"), plan))];
     let of_tasks = tasks
         .iter()
         .filter(|task| task.frames.unfinished() > 0)
@@ -280,16 +294,13 @@ fn finish_status(attempts: &Attempts, tasks: &[TaskStatus], plan: &FarmPlan, que
 mod tests {
     use std::fs;
 
-    use bansho_media::files::overwrite_policy::OverwritePolicy;
+    use bansho::{Unobserved, job::SceneFile, media::files::overwrite_policy::OverwritePolicy};
 
     use super::*;
     use crate::{
-        farm::{
-            journal::JournalEvent,
-            plan::tests::plan,
-            products::{FlipbookRequest, Products},
-        },
-        job::SceneFile,
+        journal::JournalEvent,
+        plan::tests::plan,
+        products::{FlipbookRequest, Products},
     };
 
     const SCENE: &str = "bansho = 2\n[picture]\nsize = [8, 8]\nframes = 10\n";
@@ -318,7 +329,6 @@ mod tests {
 
     #[test]
     fn frames_are_counted_by_their_files() {
-        use bansho_base::host::observer::Unobserved;
         let folder = tempfile::tempdir().unwrap();
         let (job, farm, plan) = shot(&folder, SCENE);
         assert_eq!(
@@ -440,7 +450,6 @@ mod tests {
 
     #[test]
     fn all_files_of_a_flipbook_must_be_there() {
-        use bansho_base::host::observer::Unobserved;
         let folder = tempfile::tempdir().unwrap();
         let (job, farm, plan) = shot(&folder, SCENE);
         (0..3).for_each(|index| drop(task::chunk_job(&job, &farm, &plan, index).unwrap().run(&Unobserved).unwrap()));
@@ -448,7 +457,7 @@ mod tests {
         let plan = FarmPlan { products: Products { flipbook, ..Products::default() }, ..plan };
         let journal = journal::Journal::create(&farm.journal(), "finish").unwrap();
         journal.write(&start(&plan)).unwrap();
-        crate::farm::finish::finish(&job, &farm, &plan, &Unobserved).unwrap();
+        crate::finish::finish(&job, &farm, &plan, &Unobserved).unwrap();
         let unmade = || status(&job, &farm, &plan, None).unwrap().unmade.len();
         assert_eq!(unmade(), 4, "until the last job says that these are of this plan");
         journal.write(&end(0, "")).unwrap();

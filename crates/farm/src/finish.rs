@@ -2,29 +2,30 @@
 
 use std::path::{Path, PathBuf};
 
-use bansho_base::{
-    frame::{DisplayImage, DisplayPixels, Frame},
-    host::observer::{Observer, check},
-    image::{Image, Rect},
-};
-use bansho_media::{
-    files::naming::OutputPattern,
-    format::OutputKind,
-    output::{
-        frame_file::{self, LinearPixels},
-        sink::{FinishedPicture, FrameSlot},
+use bansho::{
+    Frame, Image, Observer, Rect,
+    base::{
+        frame::{DisplayImage, DisplayPixels},
+        host::observer::check,
+    },
+    job::{FlipbookSummary, FrameState, Job, JobError, JobObserver, PreparedJob, frames},
+    media::{
+        files::naming::OutputPattern,
+        format::OutputKind,
+        output::{
+            frame_file::{self, FrameFileError, LinearPixels},
+            sink::{FinishedPicture, FrameSlot},
+        },
     },
 };
 use rayon::prelude::*;
 
 use super::{
     error::FarmError,
-    film::{self, unreadable},
     plan::{FarmFolder, FarmPlan},
-    products::Products,
+    products::{Products, unreadable},
     task::{tile_job, tile_rect},
 };
-use crate::job::{FlipbookSummary, FrameState, Job, JobError, JobObserver, PreparedJob, frames};
 
 /// Finishes the shot of a plan. Tells what the flipbook consists of.
 ///
@@ -57,7 +58,7 @@ impl FinishedFrames {
         current: &Path,
         observer: &dyn JobObserver,
     ) -> Result<Option<FlipbookSummary>, FarmError> {
-        film::make(products, &self.whole, &self.job, current, observer)
+        products.make(&self.whole, &self.job, current, observer)
     }
 }
 
@@ -72,14 +73,11 @@ pub fn finish_frames(
     observer: &dyn Observer,
 ) -> Result<FinishedFrames, FarmError> {
     let whole = Job { resume: true, ..job.clone() }.prepare()?;
-    let incomplete = |missing: Vec<i64>| match missing.is_empty() {
-        true => Ok(()),
-        false => Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output_path() }),
-    };
-    if tiles == [1, 1] {
-        incomplete(unfinished(&whole))?;
-    } else {
-        incomplete(unfinished_tiles(job, folder, tiles)?)?;
+    let missing = if tiles == [1, 1] { unfinished(&whole) } else { unfinished_tiles(job, folder, tiles)? };
+    if !missing.is_empty() {
+        return Err(FarmError::Incomplete { frames: frames::format_ranges(&missing), files: job.output_path() });
+    }
+    if tiles != [1, 1] {
         join(&whole, job, folder, tiles, observer)?;
     }
     Ok(FinishedFrames { job: job.clone(), whole })
@@ -111,11 +109,11 @@ fn join(
     tiles: [usize; 2],
     observer: &dyn Observer,
 ) -> Result<(), FarmError> {
-    let patterns = (0..tiles[0] * tiles[1]).map(|tile| {
+    let mut patterns = Vec::new();
+    for tile in 0..tiles[0] * tiles[1] {
         let path = tile_job(job, folder, tiles, tile)?.output_path();
-        Ok(OutputPattern::parse(&path, whole.frames().len()).map_err(JobError::Naming)?)
-    });
-    let patterns = patterns.collect::<Result<Vec<_>, FarmError>>()?;
+        patterns.push(OutputPattern::parse(&path, whole.frames().len()).map_err(JobError::Naming)?);
+    }
     for number in unfinished(whole) {
         check(observer).map_err(|_| JobError::Cancelled)?;
         let paths: Vec<PathBuf> = patterns.iter().map(|pattern| pattern.path(number)).collect();
@@ -128,23 +126,29 @@ fn join(
 fn join_frame(whole: &PreparedJob, number: i64, tiles: [usize; 2], paths: &[PathBuf]) -> Result<(), FarmError> {
     let size = whole.plan().size();
     let rects: Vec<Rect> = (0..paths.len()).map(|tile| tile_rect(size, tiles, tile)).collect();
-    let sink = whole.format.open(whole.plan(), whole.compiled.has_opaque_plate(), 1, size, 1)?;
+    let sink = whole.open_sink(whole.output().clone(), 1, size)?;
     let slot = FrameSlot { index: 0, number };
     let fingerprint = whole.expected_fingerprint(number);
-    match whole.format.pattern.kind() {
+    match whole.output().kind() {
         OutputKind::Exr => {
-            let read = |path: &PathBuf| frame_file::read_exr(path).map_err(unreadable(path));
-            let parts = paths.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
+            let parts = read_tiles(paths, frame_file::read_exr)?;
             let frame = join_linear(whole, number, fingerprint, &rects, parts);
             sink.write(slot, FinishedPicture::Linear(&frame))?;
         }
         _ => {
-            let read = |path: &PathBuf| frame_file::read_png(path).map_err(unreadable(path));
-            let parts = paths.par_iter().map(read).collect::<Result<Vec<_>, _>>()?;
+            let parts = read_tiles(paths, frame_file::read_png)?;
             sink.write(slot, FinishedPicture::Display(&join_display(size, &rects, parts), &fingerprint))?;
         }
     }
     Ok(sink.finish()?)
+}
+
+/// The tiles of one frame, in the order of `paths`.
+fn read_tiles<T: Send>(
+    paths: &[PathBuf],
+    read: impl Fn(&Path) -> Result<T, FrameFileError> + Sync,
+) -> Result<Vec<T>, FarmError> {
+    paths.par_iter().map(|path| read(path).map_err(unreadable(path))).collect()
 }
 
 /// Copies the values of a rectangle into a picture of `width` columns.
@@ -155,6 +159,7 @@ fn paste<T: Copy>(whole: &mut [T], width: usize, rect: Rect, part: &[T]) {
     }
 }
 
+/// Joins display pixels of 8 or of 16 bits: all tiles of a picture have the same depth.
 fn join_display(size: [usize; 2], rects: &[Rect], parts: Vec<DisplayImage>) -> DisplayImage {
     let [width, height] = size;
     let (opaque, alpha) = parts.first().map_or((true, Default::default()), |part| (part.opaque, part.alpha));
@@ -177,6 +182,7 @@ fn join_display(size: [usize; 2], rects: &[Rect], parts: Vec<DisplayImage>) -> D
     DisplayImage { width, height, opaque, alpha, encoding, pixels }
 }
 
+/// Joins scene-linear light with its depth and channels: all tiles of a picture have the same ones, in the same order.
 fn join_linear(
     whole: &PreparedJob,
     number: i64,
@@ -204,17 +210,17 @@ fn join_linear(
     Frame { header, beauty, depth, channels, opaque: false, metadata: Vec::new(), content }
 }
 
-#[cfg(all(test, feature = "fire"))]
+#[cfg(test)]
 mod tests {
     use std::{fs, path::Path};
 
-    use bansho_base::host::observer::Unobserved;
-
-    use super::*;
-    use crate::{
-        farm::{chunks::ChunkGrid, plan::FarmPlanOptions, products::FlipbookRequest, task::chunk_job},
+    use bansho::{
+        Unobserved,
         job::{Flipbook, FlipbookCrop, OptionError, SceneFile},
     };
+
+    use super::*;
+    use crate::{chunks::ChunkGrid, plan::FarmPlanOptions, products::FlipbookRequest, task::chunk_job};
 
     const SCENE: &str = "bansho = 2\n[picture]\nsize = [53, 37]\nframes = 3\n[[flame_sheet]]\n";
 
@@ -298,7 +304,7 @@ mod tests {
             assert_eq!(products.flipbook.as_ref().unwrap().frame_count(), 4);
             let finished = finish_frames(&job, &farm, plan.tiles, &Unobserved).unwrap();
             let summary = finished.products(&products, folder.path(), &Unobserved).unwrap().unwrap();
-            assert_eq!(summary.files, film::paths(&products, &job, folder.path()).unwrap());
+            assert_eq!(summary.files, products.paths(&job, folder.path()).unwrap());
             let alone = tempfile::tempdir().unwrap();
             let crop = if tile.is_some() { FlipbookCrop::None } else { FlipbookCrop::Auto };
             let out = Some(alone.path().join(name));

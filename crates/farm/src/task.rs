@@ -2,18 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use bansho_base::image::Rect;
-use bansho_media::{files::naming::OutputPattern, format::OutputKind};
+use bansho::{
+    Rect,
+    job::{Job, JobError, JobObserver, PreparedJob},
+    media::{files::naming::OutputPattern, format::OutputKind},
+};
 
 use super::{
     chunks::ChunkGrid,
     error::FarmError,
     plan::{FarmFolder, FarmPlan},
 };
-use crate::job::{Job, JobObserver, PreparedJob};
 
 /// Snapshots at chunk starts only: this interval is never reached after the first frame.
-const NO_MORE_SNAPSHOTS: u64 = i64::MAX as u64;
+pub(super) const NO_MORE_SNAPSHOTS: u64 = i64::MAX as u64;
 
 /// The name of the frames of a job.
 ///
@@ -21,7 +23,7 @@ const NO_MORE_SNAPSHOTS: u64 = i64::MAX as u64;
 /// It names a film or a contact sheet.
 pub fn sequence_name(job: &Job) -> Result<PathBuf, FarmError> {
     let path = job.output_path();
-    let kind = OutputPattern::parse(&path, 2).map_err(crate::job::JobError::Naming)?.kind();
+    let kind = OutputPattern::parse(&path, 2).map_err(JobError::Naming)?.kind();
     if job.contact_sheet.is_some() || !matches!(kind, OutputKind::Png | OutputKind::Exr) {
         return Err(FarmError::NotASequence { path });
     }
@@ -30,10 +32,14 @@ pub fn sequence_name(job: &Job) -> Result<PathBuf, FarmError> {
 
 /// Rectangle `tile` of `columns` x `rows` rectangles that cover a picture.
 pub fn tile_rect(size: [usize; 2], [columns, rows]: [usize; 2], tile: usize) -> Rect {
-    let cut = |side: usize, parts: usize, index: usize| (side * index / parts, side * (index + 1) / parts);
-    let (left, right) = cut(size[0], columns, tile % columns);
-    let (top, bottom) = cut(size[1], rows, tile / columns);
+    let (left, right) = part_of(size[0], columns, tile % columns);
+    let (top, bottom) = part_of(size[1], rows, tile / columns);
     Rect { x: left, y: top, width: right - left, height: bottom - top }
+}
+
+/// The bounds of part `index` of a side of `length` pixels in `parts` parts, whose lengths differ by one pixel at most.
+fn part_of(length: usize, parts: usize, index: usize) -> (usize, usize) {
+    (length * index / parts, length * (index + 1) / parts)
 }
 
 /// The job that draws tile `tile` of the pictures of `job`, or all of them where there is only one tile.
@@ -123,6 +129,16 @@ pub fn last_missing_snapshot(
     grid.last_snapshot()?;
     let starts = chunks.into_iter().filter_map(|chunk| grid.start(chunk)).filter(|start| *start > grid.first_frame());
     starts.filter(|start| !snapshots.join(format!("state.{start}.bansho")).exists()).max()
+}
+
+/// Factor from the estimated to the requested memory.
+const MEMORY_HEADROOM: f64 = 1.5;
+/// Memory for what is not estimated, MiB.
+const MEMORY_EXTRA_MIB: f64 = 256.0;
+
+/// The memory to request of a batch system for what is estimated to take `bytes` at its peak, MiB.
+pub(super) fn requested_memory_mib(bytes: f64) -> u64 {
+    (bytes / f64::from(1 << 20) * MEMORY_HEADROOM + MEMORY_EXTRA_MIB).ceil() as u64
 }
 
 /// Checks that a path or an argument can stand in a script.

@@ -2,9 +2,10 @@
 
 use std::{io, path::PathBuf};
 
-use bansho_media::{MediaError, files::input::InputError, output::frame_file::FrameFileError};
-
-use crate::job::{ErrorCategory, JobError, frames::FrameListError};
+use bansho::{
+    job::{ErrorCategory, JobError, frames::FrameListError},
+    media::{MediaError, files::input::InputError, output::frame_file::FrameFileError},
+};
 
 /// Why work on many machines cannot be planned, or a task refuses to run.
 #[derive(Debug, thiserror::Error)]

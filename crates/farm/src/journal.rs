@@ -11,7 +11,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use bansho_media::files::input;
+use bansho::media::files::input;
 use serde::{Deserialize, Serialize};
 
 /// What a journal is about: `check`, `snapshots`, `finish`, or a task by its number.
@@ -139,17 +139,18 @@ pub type Attempts = BTreeMap<String, Vec<Attempt>>;
 
 /// Reads all journals of a folder; none if there is no folder. A journal that cannot be read is left out.
 pub fn read(folder: &Path) -> Attempts {
-    let mut found: Vec<(String, usize, PathBuf)> = Vec::new();
+    let mut journals: Vec<(String, usize, PathBuf)> = Vec::new();
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         let parts = name.strip_suffix(".jsonl").and_then(|name| name.rsplit_once('.'));
         if let Some((task, Ok(attempt))) = parts.map(|(task, attempt)| (task, attempt.parse())) {
-            found.push((task.to_owned(), attempt, entry.path()));
+            journals.push((task.to_owned(), attempt, entry.path()));
         }
     }
-    found.sort();
+    // By number, not by name: attempt 10 comes after attempt 9.
+    journals.sort();
     let mut attempts = Attempts::new();
-    for (task, _, path) in found {
+    for (task, _, path) in journals {
         let text = input::read(&path, JOURNAL_BYTES).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
         attempts.entry(task).or_default().extend(text.map(|text| Attempt::read(&text)));
     }

@@ -1,14 +1,13 @@
-//! `bansho farm snapshots`, `bansho farm tile`, `bansho farm check`: what the steps of a template run, which has no plan.
+//! `bansho farm check`, `bansho farm snapshots`, `bansho farm tile`, `bansho farm finish`: what the steps of a template run, which has no plan.
 
-use bansho::{
-    base::host::plural::counted,
-    farm::{FarmError, FarmFolder, chunks::ChunkGrid, machine, status, task},
-    job::Job,
-};
+use std::path::Path;
 
-use super::{run_in_pool, task::wait_for};
+use bansho::{base::host::plural::counted, job::Job};
+use bansho_farm::{FarmError, FarmFolder, chunks::ChunkGrid, finish, machine, status, task};
+
+use super::{flipbook_result, run_in_pool, task::wait_for};
 use crate::{
-    args::{CheckMachineArgs, ProgressKind, SnapshotsArgs, TileArgs},
+    args::{CheckMachineArgs, FinishArgs, ProgressKind, SnapshotsArgs, TileArgs},
     output::print,
     progress::{JobResult, ProgressReporter},
 };
@@ -60,5 +59,17 @@ pub(crate) fn check(args: &CheckMachineArgs) -> anyhow::Result<()> {
         }
         wait_for(|| machine::check_token(token.clone(), &args.token))?;
         Ok(None)
+    })
+}
+
+/// Checks that all frames are whole, joins tiles, and makes what is asked for.
+pub(crate) fn finish(args: &FinishArgs) -> anyhow::Result<()> {
+    let work = &args.render.work;
+    run_in_pool(work.threads, ProgressReporter::new(work.progress, work.stats), |reporter| {
+        let job = Job { contact_sheet: None, ..args.render.job()? };
+        let products = args.products.products(args.render.contact_sheet);
+        let folder = FarmFolder::beside(&task::sequence_name(&job)?);
+        let finished = finish::finish_frames(&job, &folder, args.tiles, reporter)?;
+        Ok(finished.products(&products, Path::new(""), reporter)?.map(flipbook_result))
     })
 }
