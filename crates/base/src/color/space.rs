@@ -145,7 +145,7 @@ fn dot_single([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
 }
 
 #[inline(always)]
-fn apply_single(m: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
+pub(super) fn apply_single(m: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
     [dot_single(m[0], v), dot_single(m[1], v), dot_single(m[2], v)]
 }
 

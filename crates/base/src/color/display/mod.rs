@@ -1,5 +1,6 @@
 //! From exposed light to the codes of a display, and back.
 
+pub(crate) mod agx;
 pub mod alpha;
 pub mod gamut;
 pub mod quantize;

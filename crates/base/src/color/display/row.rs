@@ -11,6 +11,7 @@ use super::{
     tone::ToneCurve,
     transfer::clamp_components,
 };
+use crate::color::space::acescg_from_srgb;
 
 /// Pixels processed together: a whole number of vectors at any width.
 const BLOCK: usize = 32;
@@ -24,26 +25,40 @@ pub(super) struct PixelPosition {
 
 type Planes = [[f32; BLOCK]; 4];
 
-/// Scene light to display light. A trait instead of a closure: closures cannot be forced inline, and code that is not inlined is not vectorized.
-trait DisplayTransform {
-    fn apply(&self, acescg: [f32; 3]) -> [f32; 3];
+/// Scene light to display light, and back. A trait instead of a closure: closures cannot be forced inline, and code that is not inlined is not vectorized.
+pub(super) trait DisplayTransform {
+    /// Exposed ACEScg to linear display light within 0..=1. Never NaN.
+    fn display_from_acescg(&self, acescg: [f32; 3]) -> [f32; 3];
+
+    /// The exposed ACEScg that is shown as linear sRGB, which is clamped to 0..=1.
+    fn acescg_from_display(&self, display: [f32; 3]) -> [f32; 3];
 }
 
-struct ToneMapped<'a>(&'a ToneCurve);
-
-impl DisplayTransform for ToneMapped<'_> {
+/// The largest component by a tone curve, with saturation and hue of the view `display`.
+impl DisplayTransform for ToneCurve {
     #[inline(always)]
-    fn apply(&self, acescg: [f32; 3]) -> [f32; 3] {
-        display_from_acescg(self.0, acescg)
+    fn display_from_acescg(&self, acescg: [f32; 3]) -> [f32; 3] {
+        display_from_acescg(self, acescg)
+    }
+
+    #[inline(always)]
+    fn acescg_from_display(&self, display: [f32; 3]) -> [f32; 3] {
+        acescg_from_display(self, display)
     }
 }
 
-struct Clamped;
+/// ACEScg within 0..=1, which is not converted to sRGB.
+pub(super) struct Clamped;
 
 impl DisplayTransform for Clamped {
     #[inline(always)]
-    fn apply(&self, acescg: [f32; 3]) -> [f32; 3] {
+    fn display_from_acescg(&self, acescg: [f32; 3]) -> [f32; 3] {
         clamp_components(acescg)
+    }
+
+    #[inline(always)]
+    fn acescg_from_display(&self, display: [f32; 3]) -> [f32; 3] {
+        acescg_from_srgb(clamp_components(display))
     }
 }
 
@@ -111,10 +126,10 @@ impl PixelEncoding for PremultipliedEncoded {
     }
 }
 
-/// Converts a row through a tone curve to sRGB-encoded codes.
+/// Converts a row by a transform to sRGB-encoded codes.
 #[inline(always)]
-pub(super) fn encode_row<C: DisplayCode>(
-    tone: &ToneCurve,
+pub(super) fn encode_row<C: DisplayCode, V: DisplayTransform>(
+    view: &V,
     pixels: &[[f32; 4]],
     position: PixelPosition,
     alpha: Option<AlphaMode>,
@@ -122,16 +137,15 @@ pub(super) fn encode_row<C: DisplayCode>(
 ) {
     use AlphaConvention::{Encoded, Linear};
     use AlphaMode::{Premultiplied, Straight};
-    let view = ToneMapped(tone);
     match alpha {
-        None => convert::<C, ToneMapped<'_>, Opaque<false>>(&view, pixels, position, out),
-        Some(Straight(Linear)) => convert::<C, ToneMapped<'_>, LinearAlpha<false>>(&view, pixels, position, out),
-        Some(Straight(Encoded)) => convert::<C, ToneMapped<'_>, EncodedAlpha>(&view, pixels, position, out),
+        None => convert::<C, V, Opaque<false>>(view, pixels, position, out),
+        Some(Straight(Linear)) => convert::<C, V, LinearAlpha<false>>(view, pixels, position, out),
+        Some(Straight(Encoded)) => convert::<C, V, EncodedAlpha>(view, pixels, position, out),
         Some(Premultiplied(Linear)) => {
-            convert::<C, ToneMapped<'_>, PremultipliedLinear<false>>(&view, pixels, position, out);
+            convert::<C, V, PremultipliedLinear<false>>(view, pixels, position, out);
         }
         Some(Premultiplied(Encoded)) => {
-            convert::<C, ToneMapped<'_>, PremultipliedEncoded>(&view, pixels, position, out);
+            convert::<C, V, PremultipliedEncoded>(view, pixels, position, out);
         }
     }
 }
@@ -245,19 +259,19 @@ fn to_planes(block: &[[f32; 4]; BLOCK]) -> Planes {
 fn block_to_display<V: DisplayTransform>(view: &V, scene: &Planes) -> Planes {
     let mut light = [[0.0; BLOCK]; 4];
     for i in 0..BLOCK {
-        let rgb = view.apply([scene[0][i], scene[1][i], scene[2][i]]);
+        let rgb = view.display_from_acescg([scene[0][i], scene[1][i], scene[2][i]]);
         (light[0][i], light[1][i], light[2][i], light[3][i]) = (rgb[0], rgb[1], rgb[2], scene[3][i]);
     }
     light
 }
 
-/// Linear display sRGB to exposed ACEScg by the inverse of a tone curve, in place; the fourth component is unchanged.
+/// Linear display sRGB to exposed ACEScg by the inverse of a transform, in place; the fourth component is unchanged.
 #[inline(always)]
-pub(super) fn to_scene(tone: &ToneCurve, pixels: &mut [[f32; 4]]) {
+pub(super) fn to_scene<V: DisplayTransform>(view: &V, pixels: &mut [[f32; 4]]) {
     for pixels in pixels.chunks_mut(BLOCK) {
         let mut block = [[0.0; 4]; BLOCK];
         block[..pixels.len()].copy_from_slice(pixels);
-        let scene = block_to_scene(tone, &to_planes(&block));
+        let scene = block_to_scene(view, &to_planes(&block));
         for (i, pixel) in pixels.iter_mut().enumerate() {
             (pixel[0], pixel[1], pixel[2]) = (scene[0][i], scene[1][i], scene[2][i]);
         }
@@ -265,10 +279,10 @@ pub(super) fn to_scene(tone: &ToneCurve, pixels: &mut [[f32; 4]]) {
 }
 
 #[inline(always)]
-fn block_to_scene(tone: &ToneCurve, light: &Planes) -> Planes {
+fn block_to_scene<V: DisplayTransform>(view: &V, light: &Planes) -> Planes {
     let mut scene = [[0.0; BLOCK]; 4];
     for i in 0..BLOCK {
-        let rgb = acescg_from_display(tone, [light[0][i], light[1][i], light[2][i]]);
+        let rgb = view.acescg_from_display([light[0][i], light[1][i], light[2][i]]);
         (scene[0][i], scene[1][i], scene[2][i]) = (rgb[0], rgb[1], rgb[2]);
     }
     scene

@@ -3,14 +3,14 @@
 use fearless_simd::{Level, dispatch};
 
 use super::{
+    agx::Agx,
     alpha::{AlphaConvention, AlphaMode},
-    gamut::{acescg_from_display, display_from_acescg, sanitized},
+    gamut::sanitized,
     quantize::DisplayCode,
-    row,
+    row::{self, Clamped, DisplayTransform},
     tone::ToneCurve,
-    transfer::clamp_components,
 };
-use crate::color::{space::acescg_from_srgb, white_balance::WhiteBalance};
+use crate::color::white_balance::WhiteBalance;
 
 /// Scene brightness up to which the default view is the identity.
 const KNEE: f32 = 0.6;
@@ -23,20 +23,28 @@ const BALANCE_CHUNK: usize = 256;
 ///
 /// - `display`: for viewing. Identity for colors inside sRGB below 0.6, a shoulder up to 16, highlights desaturate toward white, hue is preserved
 ///   except in warm highlights, which shift toward yellow ([`gamut`](super::gamut)).
+/// - `agx`: AgX as in Blender 4 and three.js: a film-like sigmoid on each channel, in which bright colors become pale.
 /// - `standard`: identity inside sRGB up to 1.0; only values beyond are changed, by the same desaturation.
 /// - `raw`: ACEScg values clamped to 0..=1, without encoding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// `None` for `raw`.
-    tone: Option<ToneCurve>,
+    transform: Transform,
     /// White balance, applied first; `None` for `raw`.
     balance: Option<WhiteBalance>,
     name: &'static str,
 }
 
+/// The transform of a view, after its white balance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Transform {
+    ToneMapped(ToneCurve),
+    Agx,
+    Raw,
+}
+
 /// Error: there is no view of that name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no view `{name}` (allowed: display, standard, raw)")]
+#[error("there is no view `{name}` (allowed: display, agx, standard, raw)")]
 pub struct UnknownView {
     /// The requested name.
     pub name: String,
@@ -50,22 +58,28 @@ impl Default for View {
 
 impl View {
     /// The default: tone curve, desaturated highlights, gamut mapping, sRGB encoding.
-    pub const DISPLAY: Self =
-        Self { tone: Some(ToneCurve::with_shoulder(KNEE, WHITE)), balance: None, name: "display" };
+    pub const DISPLAY: Self = Self {
+        transform: Transform::ToneMapped(ToneCurve::with_shoulder(KNEE, WHITE)),
+        balance: None,
+        name: "display",
+    };
+    /// AgX, as Blender 4 and three.js show light by default.
+    pub const AGX: Self = Self { transform: Transform::Agx, balance: None, name: "agx" };
     /// No tone curve: gamut mapping and sRGB encoding.
-    pub const STANDARD: Self = Self { tone: Some(ToneCurve::clip()), balance: None, name: "standard" };
+    pub const STANDARD: Self =
+        Self { transform: Transform::ToneMapped(ToneCurve::clip()), balance: None, name: "standard" };
     /// Linear ACEScg, clamped.
-    pub const RAW: Self = Self { tone: None, balance: None, name: "raw" };
+    pub const RAW: Self = Self { transform: Transform::Raw, balance: None, name: "raw" };
 
     /// The names of all views, default first.
-    pub const NAMES: [&'static str; 3] = [Self::DISPLAY.name, Self::STANDARD.name, Self::RAW.name];
+    pub const NAMES: [&'static str; 4] = [Self::DISPLAY.name, Self::AGX.name, Self::STANDARD.name, Self::RAW.name];
 
     /// The view called `name`.
     ///
     /// # Errors
     /// There is no view of that name; the message lists all names.
     pub fn from_name(name: &str) -> Result<Self, UnknownView> {
-        [Self::DISPLAY, Self::STANDARD, Self::RAW]
+        [Self::DISPLAY, Self::AGX, Self::STANDARD, Self::RAW]
             .into_iter()
             .find(|view| view.name == name)
             .ok_or_else(|| UnknownView { name: name.to_owned() })
@@ -75,7 +89,7 @@ impl View {
     /// balance.
     #[must_use]
     pub fn with_white_balance(mut self, temperature_k: Option<f64>) -> Self {
-        self.balance = temperature_k.filter(|_| self.tone.is_some()).map(WhiteBalance::from_black_body);
+        self.balance = temperature_k.filter(|_| self.transform != Transform::Raw).map(WhiteBalance::from_black_body);
         self
     }
 
@@ -89,10 +103,14 @@ impl View {
     #[inline(always)]
     #[must_use]
     pub fn to_display(&self, acescg: [f32; 3]) -> [f32; 3] {
-        match (&self.tone, &self.balance) {
-            (Some(tone), Some(balance)) => display_from_acescg(tone, apply_balance(balance, acescg)),
-            (Some(tone), None) => display_from_acescg(tone, acescg),
-            (None, _) => clamp_components(acescg),
+        let balanced = match &self.balance {
+            Some(balance) => apply_balance(balance, acescg),
+            None => acescg,
+        };
+        match &self.transform {
+            Transform::ToneMapped(tone) => tone.display_from_acescg(balanced),
+            Transform::Agx => Agx.display_from_acescg(balanced),
+            Transform::Raw => Clamped.display_from_acescg(balanced),
         }
     }
 
@@ -102,22 +120,24 @@ impl View {
     #[inline(always)]
     #[must_use]
     pub fn to_scene(&self, display: [f32; 3]) -> [f32; 3] {
-        match (&self.tone, &self.balance) {
-            (Some(tone), Some(balance)) => balance.invert(acescg_from_display(tone, display)),
-            (Some(tone), None) => acescg_from_display(tone, display),
-            (None, _) => acescg_from_srgb(clamp_components(display)),
+        let balanced = match &self.transform {
+            Transform::ToneMapped(tone) => tone.acescg_from_display(display),
+            Transform::Agx => Agx.acescg_from_display(display),
+            Transform::Raw => Clamped.acescg_from_display(display),
+        };
+        match &self.balance {
+            Some(balance) => balance.invert(balanced),
+            None => balanced,
         }
     }
 
     /// [`to_scene`](Self::to_scene) for many pixels in place: linear sRGB in, exposed ACEScg out; the fourth component is unchanged.
     pub fn to_scene_row(&self, level: Level, pixels: &mut [[f32; 4]]) {
-        let Some(tone) = &self.tone else {
-            for pixel in pixels {
-                [pixel[0], pixel[1], pixel[2]] = self.to_scene([pixel[0], pixel[1], pixel[2]]);
-            }
-            return;
-        };
-        dispatch!(level, _simd => row::to_scene(tone, pixels));
+        match &self.transform {
+            Transform::ToneMapped(tone) => dispatch!(level, _simd => row::to_scene(tone, pixels)),
+            Transform::Agx => dispatch!(level, _simd => row::to_scene(&Agx, pixels)),
+            Transform::Raw => dispatch!(level, _simd => row::to_scene(&Clamped, pixels)),
+        }
         if let Some(balance) = &self.balance {
             for pixel in pixels {
                 [pixel[0], pixel[1], pixel[2]] = balance.invert([pixel[0], pixel[1], pixel[2]]);
@@ -181,9 +201,12 @@ impl View {
     ) {
         // Coordinates are only used by the dither, which repeats after 2^32 pixels.
         let position = row::PixelPosition { x: x0 as u32, y: y as u32 };
-        match &self.tone {
-            Some(tone) => dispatch!(level, _simd => row::encode_row::<C>(tone, pixels, position, alpha, out)),
-            None => dispatch!(level, _simd => row::encode_raw_row::<C>(pixels, position, alpha, out)),
+        match &self.transform {
+            Transform::ToneMapped(tone) => {
+                dispatch!(level, _simd => row::encode_row::<C, _>(tone, pixels, position, alpha, out));
+            }
+            Transform::Agx => dispatch!(level, _simd => row::encode_row::<C, _>(&Agx, pixels, position, alpha, out)),
+            Transform::Raw => dispatch!(level, _simd => row::encode_raw_row::<C>(pixels, position, alpha, out)),
         }
     }
 }
@@ -231,7 +254,7 @@ mod tests {
 
     #[test]
     fn cube_survives_the_way_to_the_scene_and_back() {
-        for view in [View::DISPLAY, View::STANDARD, View::DISPLAY.with_white_balance(Some(4000.0))] {
+        for view in [View::DISPLAY, View::AGX, View::STANDARD, View::DISPLAY.with_white_balance(Some(4000.0))] {
             for index in 0..17 * 17 * 17 {
                 let c = [index % 17, index / 17 % 17, index / 289].map(|i| i as f32 / 16.0);
                 let back = view.to_display(view.to_scene(c));
@@ -249,7 +272,7 @@ mod tests {
         let combined = (0..4096).map(|i| [steep[i % 16], steep[i / 16 % 16], steep[i / 256]]);
         let other = (0..40_000).map(|i| [0, 8, 16].map(|shift| (scattered(i) >> shift) as u8));
         let plate: Vec<[u8; 3]> = combined.chain(other).collect();
-        for view in [View::DISPLAY, View::STANDARD] {
+        for view in [View::DISPLAY, View::AGX, View::STANDARD] {
             let mut scene: Vec<[f32; 4]> =
                 plate.iter().map(|c| [decode_srgb8(c[0]), decode_srgb8(c[1]), decode_srgb8(c[2]), 1.0]).collect();
             view.to_scene_row(level, &mut scene);
@@ -260,9 +283,10 @@ mod tests {
             for ((plate, eight), sixteen) in plate.iter().zip(&eight).zip(&sixteen) {
                 let [r, g, b] = *plate;
                 assert_eq!(*eight, [r, g, b, 255], "{}", view.name());
-                // In 16 bits the roundings of the way through the scene may show as one step of 65535.
+                // In 16 bits the roundings of the way through the scene may show as one step of 65535; two more by the powers of AgX.
                 let exact = [r, g, b, 255].map(|code| u16::from(code) * 257);
-                assert!(sixteen.iter().zip(exact).all(|(a, b)| a.abs_diff(b) <= 1), "{sixteen:?} is not {exact:?}");
+                let steps = if view == View::AGX { 3 } else { 1 };
+                assert!(sixteen.iter().zip(exact).all(|(a, b)| a.abs_diff(b) <= steps), "{sixteen:?} is not {exact:?}");
             }
         }
     }
@@ -270,7 +294,9 @@ mod tests {
     #[test]
     fn every_level_gives_the_same_bytes() {
         let pixels = wild_pixels(4099);
-        for view in [View::DISPLAY, View::STANDARD, View::RAW, View::DISPLAY.with_white_balance(Some(4000.0))] {
+        for view in
+            [View::DISPLAY, View::AGX, View::STANDARD, View::RAW, View::DISPLAY.with_white_balance(Some(4000.0))]
+        {
             for alpha in ALPHA_MODES {
                 let (mut wide, mut narrow) = (vec![[0_u8; 4]; 4099], vec![[9_u8; 4]; 4099]);
                 view.display_row_with_mode(simd::level(), &pixels, 5, 11, alpha, &mut wide);
@@ -292,7 +318,7 @@ mod tests {
     #[test]
     fn rows_agree_with_the_scalar_view() {
         let pixels = wild_pixels(1000);
-        for view in [View::DISPLAY, View::DISPLAY.with_white_balance(Some(4000.0))] {
+        for view in [View::DISPLAY, View::AGX, View::DISPLAY.with_white_balance(Some(4000.0))] {
             let mut out = vec![[0_u16; 4]; pixels.len()];
             view.display_row(simd::level(), &pixels, 0, 0, None, &mut out);
             for (pixel, codes) in pixels.iter().zip(&out) {
@@ -360,7 +386,7 @@ mod tests {
     #[test]
     fn raw_and_standard_show_what_they_say() {
         assert_eq!(View::RAW.to_display([0.25, -0.5, 3.0]), [0.25, 0.0, 1.0]);
-        let shown = View::STANDARD.to_display(acescg_from_srgb([0.9, 0.7, 0.1]));
+        let shown = View::STANDARD.to_display(crate::color::acescg_from_srgb([0.9, 0.7, 0.1]));
         assert!(shown.iter().zip([0.9, 0.7, 0.1]).all(|(a, b)| (a - b).abs() < 1e-6), "{shown:?}");
         let mut out = [[0_u16; 4]];
         View::RAW.display_row(simd::level(), &[[0.5, 0.25, 0.0, 1.0]], 0, 0, None, &mut out);

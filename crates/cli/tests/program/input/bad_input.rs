@@ -215,7 +215,7 @@ fn assignments_at_fault_are_blamed_and_not_the_scene() {
 #[test]
 fn words_that_are_no_options_are_refused_with_the_nearest() {
     misused(&["--frmes", "1"], &["--frmes", "--frames"]);
-    misused(&["--view", "filmic"], &["display", "standard", "raw"]);
+    misused(&["--view", "filmic"], &["display", "agx", "standard", "raw"]);
     misused(&["--bits", "12"], &["8", "16"]);
 }
 
