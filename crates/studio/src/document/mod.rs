@@ -156,7 +156,7 @@ impl Document {
         self.check_state.revision == Some(self.revision)
     }
 
-    /// Sets the result of [`check`] for `revision`; results of older revisions are ignored.
+    /// Sets the result of [`check()`] for `revision`; results of older revisions are ignored.
     pub fn set_check_result(&mut self, revision: Revision, outcome: Result<Arc<Plan>, SceneError>) {
         if revision != self.revision {
             return;

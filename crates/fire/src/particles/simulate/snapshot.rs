@@ -23,7 +23,7 @@ pub(crate) fn write(particles: &GasParticles) -> Vec<u8> {
     bytes
 }
 
-/// Splits what [`write`] wrote from what follows it. All bytes of another version are taken for a state, which [`read`] refuses.
+/// Splits what [`write()`] wrote from what follows it. All bytes of another version are taken for a state, which [`read`] refuses.
 pub(crate) fn split_first(bytes: &[u8]) -> Result<(&[u8], &[u8]), SnapshotError> {
     if bytes.first_chunk::<4>().is_some_and(|version| u32::from_le_bytes(*version) != VERSION) {
         return Ok((bytes, &[]));
