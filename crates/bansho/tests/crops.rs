@@ -98,3 +98,14 @@ fn of_phenomena_that_interleave() {
                 [[rain]]\n[ground]\nwetness = 0.9\n[sky]\n[[light]]\nvisible = true\nposition = [0.5, 1, -2]\n";
     assert_parts_agree(text, 4);
 }
+
+#[test]
+fn of_things_that_cross_in_a_pan() {
+    let text = "bansho = 2\n[camera]\nposition = [0, 1.5, 6]\nshutter_s = 0.04\n\
+         target = { keys = [[0, [-1, 1, 0]], [0.2, [1, 1, 0]]], interpolation = \"linear\" }\n\
+         [sky]\nluminance = 5\ntrees_deg = 5\n[ground]\n\
+         [[light]]\nposition = [0.3, 1.7, 0.2]\nintensity = 900\nvisible = true\nradius = 0.2\n\
+         [[obstacle]]\nvisible = true\nposition = [-0.4, 0.8, 0]\n[[rain]]\nrate_mm_per_h = 20\n\
+         [[flame_sheet]]\nwidth = 0.9\nheight = 1.6\nsmoke = { optical_depth = 1 }\n";
+    assert_parts_agree(text, 2);
+}

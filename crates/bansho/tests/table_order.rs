@@ -138,3 +138,27 @@ fn sparks_are_seen_from_above_and_in_the_wind() {
     let (alone, with_rain) = (light(""), light("[[rain]]\nrate_mm_per_h = 0\n"));
     assert!(alone > 0.0 && (alone / with_rain - 1.0).abs() < 1e-4, "{alone} {with_rain}");
 }
+
+#[test]
+fn things_that_cross_in_a_pan_are_the_same_in_any_order_and_on_any_number_of_threads() {
+    let header = "bansho = 2\n[picture]\nsize = [80, 60]\nfps = 24\nexposure_ev100 = 7\n\
+         [camera]\nposition = [0, 1, 5]\nshutter_s = 0.04\n\
+         target = { keys = [[0, [-1, 0.9, 0]], [0.25, [1, 0.9, 0]]], interpolation = \"linear\" }\n";
+    let mut tables = [
+        "[sky]\nluminance = 5\ntrees_deg = 5\n",
+        "[ground]\n",
+        "[[light]]\nposition = [0.3, 1.7, 0.2]\nintensity = 900\nvisible = true\nradius = 0.2\n",
+        "[[obstacle]]\nvisible = true\nposition = [-0.4, 0.8, 0]\n",
+        "[[rain]]\nrate_mm_per_h = 20\n",
+        "[[flame_sheet]]\nname = \"b\"\nsmoke = { optical_depth = 1 }\n",
+        "[[flame_sheet]]\nname = \"a\"\nposition = [0.2, 0.1, -0.3]\nsmoke = { optical_depth = 1 }\n",
+    ];
+    let drawn = |threads: usize, tables: &[&str]| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| draw_with(header, tables))
+    };
+    let expected = drawn(1, &tables);
+    assert_eq!(drawn(3, &tables).beauty, expected.beauty);
+    tables.reverse();
+    assert!(greatest_difference(&drawn(2, &tables), &expected) < 1e-5);
+}

@@ -1,4 +1,9 @@
 //! Motion blur of phenomena that show each part of an exposure as it is in its middle: their parts are prepared one by one and averaged.
+//!
+//! Where two things move over the same pixels, the mean of what they composite is not the composite of their means: then the moments of the exposure are
+//! composited one by one ([`moments`](crate::composite::moments)), and what blurs itself is prepared in parts too.
+
+use std::sync::Arc;
 
 use bansho_base::{
     frame::MetadataEntry,
@@ -15,7 +20,7 @@ use bansho_base::{
 };
 
 /// Most parts of an exposure.
-const MAX_PARTS: usize = 64;
+const MAX_PARTS: usize = 128;
 
 /// A part of an exposure, as one phenomenon is prepared for it.
 pub(crate) struct ExposurePart<'a> {
@@ -23,26 +28,98 @@ pub(crate) struct ExposurePart<'a> {
     pub(crate) surroundings: Surroundings<'a>,
 }
 
-/// The parts of an exposure in which a phenomenon is drawn; none if it is drawn as a whole.
-pub(crate) fn exposure_parts<'a>(
-    run: &dyn Run,
-    view: &View,
-    surroundings: &Surroundings<'a>,
-    surroundings_of_part: impl Fn(&View) -> Surroundings<'a>,
-) -> Vec<ExposurePart<'a>> {
-    let count = run.exposure_parts(view, surroundings).min(MAX_PARTS);
-    if count <= 1 {
-        return Vec::new();
+/// Of how many equal parts the motion of a phenomenon during an exposure consists.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct PartCount {
+    /// Number of parts; at most 1 if nothing moves.
+    pub(crate) count: usize,
+    /// Whether its parts are drawn only where other things move over the same pixels, since it blurs itself elsewhere.
+    pub(crate) blurs_itself: bool,
+}
+
+impl PartCount {
+    /// The parts of a phenomenon, whatever else moves.
+    pub(crate) fn of_run(run: &dyn Run, view: &View, surroundings: &Surroundings) -> Self {
+        let count = run.exposure_parts(view, surroundings).min(MAX_PARTS);
+        if count > 1 {
+            return Self { count, blurs_itself: false };
+        }
+        Self { count: run.parts_when_composited(view, surroundings).min(MAX_PARTS), blurs_itself: true }
     }
-    let part = |index| {
-        let view = view.part(index, count);
-        ExposurePart { surroundings: surroundings_of_part(&view), view }
-    };
-    (0..count).map(part).collect()
+
+    fn moves(&self) -> bool {
+        self.count > 1
+    }
+}
+
+/// Raises the numbers of parts so that parts of one phenomenon begin and end with parts of the others: each becomes the largest number, or a half, a quarter or
+/// an eighth of it. What moves alone keeps its number, and is not drawn in parts if it blurs itself.
+pub(crate) fn nest(counts: &mut [PartCount]) {
+    const MAX_HALVINGS: u32 = 3;
+    if counts.iter().filter(|parts| parts.moves()).count() < 2 {
+        counts.iter_mut().filter(|parts| parts.blurs_itself).for_each(|parts| parts.count = 1);
+        return;
+    }
+    let largest = counts.iter().map(|parts| parts.count).max().unwrap_or(1);
+    let halvings = |count: usize| (largest / count).ilog2().min(MAX_HALVINGS);
+    let most = counts.iter().filter(|parts| parts.moves()).map(|parts| halvings(parts.count)).max().unwrap_or(0);
+    // MAX_PARTS is a multiple of every unit, so it remains the limit.
+    let total = largest.next_multiple_of(1 << most);
+    for parts in counts.iter_mut().filter(|parts| parts.moves()) {
+        parts.count = total >> halvings(parts.count);
+    }
+}
+
+/// The parts of an exposure in which a phenomenon is drawn, and how.
+#[derive(Default)]
+pub(crate) struct ExposureParts<'a> {
+    /// Empty if it is only drawn as a whole.
+    pub(crate) parts: Vec<ExposurePart<'a>>,
+    /// See [`PartCount::blurs_itself`]: the parts then show their middle.
+    pub(crate) blurs_itself: bool,
+}
+
+impl<'a> ExposureParts<'a> {
+    pub(crate) fn new(
+        PartCount { count, blurs_itself }: PartCount,
+        view: &View,
+        surroundings_of_part: impl Fn(&View) -> Surroundings<'a>,
+    ) -> Self {
+        if count <= 1 {
+            return Self::default();
+        }
+        let part = |index| {
+            let view = view.part(index, count);
+            let surroundings = surroundings_of_part(&view);
+            ExposurePart { surroundings, view: if blurs_itself { view.at_middle() } else { view } }
+        };
+        Self { parts: (0..count).map(part).collect(), blurs_itself }
+    }
+
+    /// The depth intervals of a phenomenon during the exposure of a view.
+    pub(crate) fn depth_intervals(
+        &self,
+        run: &dyn Run,
+        view: &View,
+        surroundings: &Surroundings,
+    ) -> Vec<DepthInterval> {
+        if self.parts.is_empty() || self.blurs_itself {
+            return run.depth_intervals(view, surroundings);
+        }
+        depth_intervals(run, &self.parts)
+    }
+}
+
+/// A phenomenon that is prepared for an exposure.
+pub(crate) struct PreparedExposure<'a> {
+    /// All of it, with motion blur.
+    pub(crate) whole: Box<dyn Prepared + 'a>,
+    /// Its parts; empty if it does not move, and for what blurs itself.
+    pub(crate) parts: Vec<Arc<dyn Prepared + 'a>>,
 }
 
 /// The depth intervals of a phenomenon in all parts of an exposure: each grows to hold its motion.
-pub(crate) fn depth_intervals(run: &dyn Run, parts: &[ExposurePart]) -> Vec<DepthInterval> {
+fn depth_intervals(run: &dyn Run, parts: &[ExposurePart]) -> Vec<DepthInterval> {
     let each: Vec<_> = parts.iter().map(|part| run.depth_intervals(&part.view, &part.surroundings)).collect();
     let hull = |a: &mut DepthInterval, b: &DepthInterval| (a.near, a.far) = (a.near.min(b.near), a.far.max(b.far));
     let mut intervals = each.first().cloned().unwrap_or_default();
@@ -65,21 +142,37 @@ pub(crate) fn depth_intervals(run: &dyn Run, parts: &[ExposurePart]) -> Vec<Dept
     all
 }
 
-/// Prepares a phenomenon for each part of an exposure.
+/// Prepares a phenomenon for the exposure of a view.
 pub(crate) fn prepare<'a>(
     run: &'a dyn Run,
     aovs: &'static [AovDescriptor],
-    parts: &'a [ExposurePart<'a>],
+    view: &'a View,
+    surroundings: &'a Surroundings<'a>,
+    exposure: &'a ExposureParts<'a>,
     observer: &dyn Observer,
-) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-    let prepared = parts.iter().map(|part| run.prepare(&part.view, &part.surroundings, observer));
-    let parts = prepared.collect::<Result<_, _>>()?;
-    Ok(Box::new(PreparedParts { parts, aovs, scratches: ScratchPool::new(Strip::default) }))
+) -> Result<PreparedExposure<'a>, Cancelled> {
+    if exposure.parts.is_empty() || exposure.blurs_itself {
+        return Ok(PreparedExposure { whole: run.prepare(view, surroundings, observer)?, parts: Vec::new() });
+    }
+    let prepared = exposure.parts.iter().map(|part| run.prepare(&part.view, &part.surroundings, observer));
+    let parts = prepared.map(|part| part.map(Arc::from)).collect::<Result<Vec<Arc<dyn Prepared>>, _>>()?;
+    let whole = PreparedParts { parts: parts.clone(), aovs, scratches: ScratchPool::new(Strip::default) };
+    Ok(PreparedExposure { whole: Box::new(whole), parts })
+}
+
+/// Prepares the parts of a phenomenon that blurs itself.
+pub(crate) fn prepare_parts<'a>(
+    run: &'a dyn Run,
+    exposure: &'a ExposureParts<'a>,
+    observer: &dyn Observer,
+) -> Result<Vec<Arc<dyn Prepared + 'a>>, Cancelled> {
+    let prepared = exposure.parts.iter().map(|part| run.prepare_part(&part.view, &part.surroundings, observer));
+    prepared.map(|part| part.map(Arc::from)).collect()
 }
 
 /// The parts of an exposure, at least one, drawn as their mean.
 struct PreparedParts<'a> {
-    parts: Vec<Box<dyn Prepared + 'a>>,
+    parts: Vec<Arc<dyn Prepared + 'a>>,
     aovs: &'static [AovDescriptor],
     scratches: ScratchPool<Strip, fn() -> Strip>,
 }
@@ -129,5 +222,41 @@ impl Prepared for PreparedParts<'_> {
 
     fn plate_role(&self) -> PlateRole {
         self.middle().plate_role()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nested(counts: &[usize]) -> Vec<usize> {
+        let mut counts: Vec<PartCount> = counts.iter().map(|&count| PartCount { count, blurs_itself: false }).collect();
+        nest(&mut counts);
+        counts.iter().map(|parts| parts.count).collect()
+    }
+
+    #[test]
+    fn parts_of_several_things_begin_together() {
+        assert_eq!(nested(&[1, 22, 1]), [1, 22, 1], "what moves alone keeps its number");
+        assert_eq!(nested(&[22, 25, 32]), [32; 3]);
+        assert_eq!(nested(&[22, 1, 11]), [22, 1, 11]);
+        assert_eq!(nested(&[23, 10]), [24, 12]);
+        assert_eq!(nested(&[23, 2, 7, 1]), [24, 3, 12, 1]);
+        for largest in 2..=MAX_PARTS {
+            for other in 2..=largest {
+                let [a, b] = nested(&[largest, other])[..] else { panic!() };
+                assert!(a >= largest && b >= other && a <= MAX_PARTS && a % b == 0, "{largest} {other}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_blurs_itself_has_parts_only_beside_other_motion() {
+        let mut counts = [PartCount { count: 8, blurs_itself: true }, PartCount { count: 1, blurs_itself: false }];
+        nest(&mut counts);
+        assert_eq!(counts.map(|parts| parts.count), [1, 1]);
+        let mut counts = [PartCount { count: 8, blurs_itself: true }, PartCount { count: 5, blurs_itself: false }];
+        nest(&mut counts);
+        assert_eq!(counts.map(|parts| parts.count), [8, 8]);
     }
 }

@@ -19,6 +19,7 @@ pub mod remarks;
 pub mod shot;
 
 pub use compiled::{BuildErrors, CompiledScene};
+pub use composite::moments::moment_bytes_per_thread;
 pub use pixels::{
     BufferLengthError, ChannelError, f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f,
     write_rgba32f,

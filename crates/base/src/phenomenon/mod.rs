@@ -242,6 +242,12 @@ pub trait Run: Send + Sync {
         1
     }
 
+    /// For what `prepare` blurs itself: number of equal parts of the exposure that are drawn apart where other things move over the same pixels, since things
+    /// that cross the same pixels need not hide each other at any moment. 1 if nothing moves by more than about a pixel.
+    fn parts_when_composited(&self, _view: &View, _surroundings: &Surroundings) -> usize {
+        1
+    }
+
     /// Prepares one frame, so that strips of it can be drawn in any order by any thread.
     ///
     /// # Errors
@@ -252,6 +258,20 @@ pub trait Run: Send + Sync {
         surroundings: &'a Surroundings<'a>,
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled>;
+
+    /// Prepares one of the [`parts_when_composited`](Self::parts_when_composited) as it is in the middle of `view.shutter`. There may be dozens, so each should
+    /// take little time and memory; see [`Prepared::within`].
+    ///
+    /// # Errors
+    /// The observer asked to stop.
+    fn prepare_part<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        self.prepare(view, surroundings, observer)
+    }
 
     /// Its particles at the middle of the exposure `view.shutter`, for export; `None` if it never has any. What exists only around a camera, as drops of rain
     /// do, is exported as far as the view shows it; a simulation exports all of its particles.
@@ -284,6 +304,10 @@ impl<P: Run + ?Sized> Run for Arc<P> {
         (**self).exposure_parts(view, surroundings)
     }
 
+    fn parts_when_composited(&self, view: &View, surroundings: &Surroundings) -> usize {
+        (**self).parts_when_composited(view, surroundings)
+    }
+
     fn prepare<'a>(
         &'a self,
         view: &'a View,
@@ -291,6 +315,15 @@ impl<P: Run + ?Sized> Run for Arc<P> {
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         (**self).prepare(view, surroundings, observer)
+    }
+
+    fn prepare_part<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        (**self).prepare_part(view, surroundings, observer)
     }
 
     fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
@@ -337,6 +370,17 @@ pub trait Prepared: Send + Sync {
     /// Bounding rectangle of the pixels that it can affect within a depth slice.
     fn bounds(&self, slice: &DepthInterval) -> Rect;
 
+    /// Bounding rectangle of the pixels in which it is not the same during the whole exposure, of what is drawn in [parts](Run::exposure_parts).
+    fn moving_bounds(&self) -> Rect {
+        self.bounds(&DepthInterval::ALL)
+    }
+
+    /// It for the pixels of `rect` only, where parts of an exposure would take much memory as whole pictures: computed when these pixels are drawn. `None`
+    /// if it is prepared for all pixels.
+    fn within(&self, _rect: Rect) -> Option<Box<dyn Prepared + '_>> {
+        None
+    }
+
     /// Draws the contents of `slice` into `strip`, front to back, with motion blur over the exposure.
     ///
     /// The value of a pixel must not depend on the strip in which it is drawn.
@@ -381,9 +425,11 @@ pub enum PlateRole {
     Behind,
 }
 
-/// Opaque surfaces over the whole picture.
+/// Opaque surfaces in a part of the picture that contains all of them, or in [the pixels](Prepared::within) for which they were computed.
 #[derive(Clone, Debug)]
 pub struct OpaqueSurfaces {
+    /// The pixels of `depth` and `coverage`.
+    pub rect: Rect,
     /// Depth beyond which they hide everything, m; infinite where there are none.
     pub depth: Image<1>,
     /// Fraction of a pixel that they cover. The rest of it shows the scene without them.

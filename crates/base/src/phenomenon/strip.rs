@@ -62,6 +62,15 @@ impl Shutter {
         by_path.max(parts_of_motion(self.duration() * (1.0 - 1e-9), MIN_DURATION, MAX_SAMPLES)).next_power_of_two()
     }
 
+    /// Most parts in which things that move during the exposure are drawn: 32 in the usual exposures of films, in which nothing moves far, and up to 128 in
+    /// longer ones, whose smears would show single images otherwise.
+    #[must_use]
+    pub fn max_parts(&self) -> usize {
+        /// The longest usual exposure, s.
+        const USUAL_S: f64 = 1.0 / 24.0;
+        (32.0 * (self.duration() / USUAL_S).clamp(1.0, 4.0)) as usize
+    }
+
     /// Five times from its opening to its closing, evenly spaced: enough to measure the path of what moves.
     #[must_use]
     pub fn path_times(&self) -> [f64; 5] {
@@ -212,6 +221,15 @@ impl View {
             view.next_middle += shutter.middle() - view.shutter.middle();
             view.camera = view.camera_at(shutter.middle());
             view.shutter = shutter;
+        })
+    }
+
+    /// The view at the middle of the exposure, without motion.
+    #[must_use]
+    pub fn at_middle(&self) -> Self {
+        self.clone().with_adjacent_loop_view(|view| {
+            let middle = view.shutter.middle();
+            view.shutter = Shutter { open: middle, close: middle };
         })
     }
 
@@ -391,6 +409,12 @@ impl Strip {
         self.aovs.iter_mut().for_each(|plane| plane.reset(pixels));
     }
 
+    /// Hides samples at and beyond these depths, m, as a plate does: `row` returns those of the strip's columns in row `y` of the picture.
+    pub fn hide_beyond<'a>(&mut self, row: impl Fn(usize) -> &'a [f32]) {
+        self.plate_depth.clear();
+        (self.rect.y..self.rect.bottom()).for_each(|y| self.plate_depth.extend_from_slice(row(y)));
+    }
+
     /// Number of pixels in the strip.
     pub fn len(&self) -> usize {
         self.rect.width * self.rect.height
@@ -535,6 +559,26 @@ impl Strip {
         }
         for ((own, part), aov) in self.aovs.iter_mut().zip(&part.aovs).zip(aovs) {
             own.add_weighted(part, weight, aov.rule);
+        }
+    }
+
+    /// Becomes the strip `first`, but for the pixels (column and row in the picture) that `takes_second` selects: these are those of a strip over the same
+    /// pixels. AOVs stay.
+    pub fn select(&mut self, first: &Self, second: &Self, takes_second: impl Fn(usize, usize) -> bool) {
+        self.reset(first.rect, None, 0);
+        self.upgrade_absorption(first.absorption.max(second.absorption));
+        let width = self.rect.width.max(1);
+        for index in 0..self.len() {
+            let chosen = takes_second(self.rect.x + index % width, self.rect.y + index / width);
+            let from = if chosen { second } else { first };
+            let transmittance = from.transmittance(index);
+            for c in 0..3 {
+                self.radiance[c][index] = from.radiance[c][index];
+            }
+            for c in 0..self.absorption.planes() {
+                self.transmittance[c][index] = transmittance[c];
+            }
+            self.depth[index] = from.depth[index];
         }
     }
 

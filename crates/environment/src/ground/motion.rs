@@ -12,8 +12,8 @@ use super::{GroundKind, hits::HORIZON, model::Ground};
 
 /// Motion between the parts of an exposure, pixels.
 const PIXELS_PER_PART: f64 = 1.0;
-/// Most parts of an exposure.
-const MAX_PARTS: usize = 32;
+/// Most parts of an exposure for waves, and of lakes, whose parts keep pictures.
+const MAX_LAKE_PARTS: usize = 32;
 
 impl Ground {
     /// The parts of an exposure in which nothing on the ground moves by much more than a pixel.
@@ -23,7 +23,9 @@ impl Ground {
         let motion = camera_motion.max(shadow_motion(view, surroundings));
         // Lights that move over ground that stands still are several, each with its share.
         let of_lights = if motion > 0.0 { surroundings.light_parts.len() } else { 1 };
-        parts_of_motion(motion, PIXELS_PER_PART, MAX_PARTS).max(self.parts_of_waves(view)).max(of_lights)
+        let max_parts =
+            if self.parameters.kind == GroundKind::Water { MAX_LAKE_PARTS } else { view.shutter.max_parts() };
+        parts_of_motion(motion, PIXELS_PER_PART, max_parts).max(self.parts_of_waves(view)).max(of_lights)
     }
 
     /// Longest path of a point of the ground in the picture as the camera moves, pixels.
@@ -52,7 +54,7 @@ impl Ground {
             return 1;
         }
         let periods = view.shutter.duration() * super::waves::highest_frequency(self.parameters.wave_length);
-        parts_of_motion(periods * PARTS_PER_PERIOD, 1.0, MAX_PARTS)
+        parts_of_motion(periods * PARTS_PER_PERIOD, 1.0, MAX_LAKE_PARTS)
     }
 }
 

@@ -10,7 +10,7 @@ use bansho_base::{
 
 /// Motion between the parts of an exposure, pixels: about the radius of the smallest disc.
 const PIXELS_PER_PART: f64 = 1.0;
-/// Most parts of an exposure.
+/// Most parts of a usual exposure.
 const MAX_PARTS: usize = 64;
 /// Parts of an exposure in which a lamp flashes.
 const FLASH_PARTS: usize = 16;
@@ -53,7 +53,7 @@ impl Lamps {
         };
         let count = path[0].len();
         let motion = (0..count).map(|lamp| cameras.path_pixels(|t| position(lamp, t))).fold(0.0, f64::max);
-        let moved = parts_of_motion(motion, PIXELS_PER_PART, MAX_PARTS);
+        let moved = parts_of_motion(motion, PIXELS_PER_PART, MAX_PARTS.max(view.shutter.max_parts()));
         if (0..count).any(|lamp| flashes(path.each_ref().map(|lamps| lamps.get(lamp)))) {
             moved.max(FLASH_PARTS)
         } else {

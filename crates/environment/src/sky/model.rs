@@ -44,27 +44,32 @@ impl SkyBackdrop {
 
     /// The cached night sky of a view; `None` by day.
     pub(super) fn cache(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<SkyCache> {
-        let night = sky.night()?;
+        sky.night()?;
         // The lock is never held during parallel work.
         let cached = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(cache) = cached().as_mut().filter(|cache| cache.matches(cameras, view.size, sky)) {
             cache.enable_row_cache();
             return Some(cache.clone());
         }
+        let cache = self.night_sky(sky, view, cameras)?;
+        *cached() = Some(cache.clone());
+        Some(cache)
+    }
+
+    /// The night sky of a view; `None` by day.
+    pub(super) fn night_sky(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<SkyCache> {
         let observer = SkyObserver::at(view.camera.position);
-        let night = &night.above(observer);
+        let night = &sky.night()?.above(observer);
         let star_images =
             self.stars().map(|stars| stars.star_images(view, night, observer, self.parameters.night.stars));
-        let cache = SkyCache {
+        Some(SkyCache {
             cameras: cameras.to_vec(),
             size: view.size,
             sky: *sky,
             night: Arc::new(NightSky::new(sky, night, self.parameters.night.milky_way, observer)),
             star_images: Arc::new(star_images.unwrap_or_default()),
             rows: None,
-        };
-        *cached() = Some(cache.clone());
-        Some(cache)
+        })
     }
 
     /// Depth interval of the hills.

@@ -212,6 +212,30 @@ impl PreparedSky<'_> {
     }
 }
 
+impl PreparedSky<'_> {
+    /// The rows that may show the edge of the hills, in any lens.
+    fn skyline_rows(&self, skyline: &Skyline) -> Rect {
+        /// Side of the squares in which it is looked for, pixels.
+        const SIDE: usize = 16;
+        let [width, height] = self.view.size;
+        // No lens shows more than 1 / f radians in a pixel. The middle of a square is at most 0.71 of its side from its corners, and edges are a pixel wide.
+        let margin = 0.8 * SIDE as f64 / self.view.camera.focal_pixels;
+        let elevations = f64::from(skyline.lowest) - margin..f64::from(skyline.highest) + margin;
+        let is_edge = |row: &usize| {
+            (0..width.div_ceil(SIDE)).any(|column| {
+                let middle = [column, *row].map(|index| (index * SIDE + SIDE / 2) as f64);
+                let directions = self.cameras.iter().filter_map(|camera| camera.direction(DVec2::from(middle)));
+                directions.map(|toward| toward.y / toward.length()).any(|sine| elevations.contains(&sine))
+            })
+        };
+        let rows = height.div_ceil(SIDE);
+        let Some(first) = (0..rows).find(is_edge) else { return Rect::default() };
+        let last = (first..rows).rfind(is_edge).unwrap_or(first);
+        let (y, bottom) = (first * SIDE, ((last + 1) * SIDE).min(height));
+        Rect { x: 0, y, width, height: bottom - y }
+    }
+}
+
 /// Coverage of pixels from `x` on in row `y` by the hills, for one camera.
 #[inline(always)]
 pub(super) fn hill_coverage(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
@@ -248,6 +272,14 @@ impl Prepared for PreparedSky<'_> {
             Rect::from_size(self.view.size[0], self.view.size[1])
         } else {
             Rect::default()
+        }
+    }
+
+    /// By day, the rows of the skyline.
+    fn moving_bounds(&self) -> Rect {
+        match self.skyline {
+            Some(skyline) if self.cache.is_none() => self.skyline_rows(skyline),
+            _ => self.bounds(&DepthInterval::ALL),
         }
     }
 

@@ -13,7 +13,8 @@ use bansho_base::{
 
 use super::{
     model::Solids,
-    trace::{PreparedSolids, depth_intervals},
+    pose::parts_of_exposure,
+    trace::{PreparedSolids, UntracedSolids, depth_intervals},
 };
 
 impl Phenomenon for Solids {
@@ -49,5 +50,18 @@ impl Run for Solids {
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         Ok(Box::new(PreparedSolids::new(self, view, surroundings, observer)?))
+    }
+
+    fn parts_when_composited(&self, view: &View, _surroundings: &Surroundings) -> usize {
+        parts_of_exposure(self, view)
+    }
+
+    fn prepare_part<'a>(
+        &'a self,
+        view: &'a View,
+        surroundings: &'a Surroundings<'a>,
+        _observer: &dyn Observer,
+    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
+        Ok(Box::new(UntracedSolids::new(self, view, surroundings)))
     }
 }

@@ -4,7 +4,7 @@ use bansho_base::{
     camera::{Camera, Lens, angular_distance::AngularDistance},
     geometry::transform::Transform,
     math::{self, DVec2, DVec3},
-    phenomenon::strip::{Shutter, View},
+    phenomenon::strip::{Shutter, View, parts_of_motion},
 };
 
 use super::{
@@ -49,23 +49,35 @@ pub(super) struct SurfacePoint<'a> {
     pub(super) normal: DVec3,
 }
 
-/// The poses of an exposure, evenly spaced in time: one if nothing moves in the picture. And which of the obstacles move.
-pub(super) fn poses<'a>(solids: &'a Solids, view: &View) -> (Vec<Pose<'a>>, Vec<bool>) {
+/// The path of each obstacle in the picture during an exposure, pixels, and the pose in the middle.
+fn motions<'a>(solids: &'a Solids, view: &View) -> (Vec<f64>, Pose<'a>) {
     let at = |t: f64| Pose::new(solids, view, t);
     let [open, middle, close] = [view.shutter.open, view.shutter.middle(), view.shutter.close].map(at);
     // An obstacle that turns around or shakes may end where it began.
     let ways = [open.motion_pixels(&close), open.motion_pixels(&middle), middle.motion_pixels(&close)];
-    let moves: Vec<bool> = (0..solids.solids.len())
-        .map(|index| ways[0][index].max(ways[1][index] + ways[2][index]) >= MIN_MOTION_PIXELS)
-        .collect();
+    let motion = |index: usize| ways[0][index].max(ways[1][index] + ways[2][index]);
+    ((0..solids.solids.len()).map(motion).collect(), middle)
+}
+
+/// The poses of an exposure, evenly spaced in time: one if nothing moves in the picture. And which of the obstacles move.
+pub(super) fn poses<'a>(solids: &'a Solids, view: &View) -> (Vec<Pose<'a>>, Vec<bool>) {
+    let (motions, middle) = motions(solids, view);
+    let moves: Vec<bool> = motions.iter().map(|motion| *motion >= MIN_MOTION_PIXELS).collect();
     if !moves.contains(&true) {
         return (vec![middle], moves);
     }
     let pose = |index: usize| Pose {
         fraction: Some((index as f64 + 0.5) / MAX_TIME_SAMPLES as f64),
-        ..at(view.shutter.instant(index, MAX_TIME_SAMPLES))
+        ..Pose::new(solids, view, view.shutter.instant(index, MAX_TIME_SAMPLES))
     };
     ((0..MAX_TIME_SAMPLES).map(pose).collect(), moves)
+}
+
+/// The parts of an exposure in which no obstacle moves by much more than a pixel of the picture.
+pub(super) fn parts_of_exposure(solids: &Solids, view: &View) -> usize {
+    let (motions, _) = motions(solids, view);
+    let motion = motions.into_iter().fold(0.0, f64::max);
+    if motion < MIN_MOTION_PIXELS { 1 } else { parts_of_motion(motion, 1.0, view.shutter.max_parts()).max(2) }
 }
 
 impl Solids {
@@ -89,7 +101,7 @@ impl Solids {
 }
 
 impl<'a> Pose<'a> {
-    fn new(solids: &'a Solids, view: &View, t: f64) -> Self {
+    pub(super) fn new(solids: &'a Solids, view: &View, t: f64) -> Self {
         let placed = |solid: &'a Solid| {
             let (placement, bounds) = (solid.obstacle.placement(t), solid.obstacle.at(t).bounding_sphere());
             let (center, radius) = bounds.unwrap_or((placement.position, f64::INFINITY));

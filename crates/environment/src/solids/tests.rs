@@ -45,14 +45,20 @@ fn drawn(solids: &Solids, view: &View, lights: &[Light]) -> (Strip, Vec<f32>) {
     }
     assert!(prepared.bounds(&DepthInterval::ALL).width <= SIZE[0]);
     let surfaces = prepared.opaque_surfaces().unwrap();
-    for (index, (depth, coverage)) in surfaces.depth.pixels().iter().zip(surfaces.coverage.pixels()).enumerate() {
+    let inside = surfaces.rect;
+    for (at, (depth, coverage)) in surfaces.depth.pixels().iter().zip(surfaces.coverage.pixels()).enumerate() {
+        let index = (inside.y + at / inside.width) * SIZE[0] + inside.x + at % inside.width;
         assert_eq!(depth[0].is_finite(), coverage[0] > 0.0, "it hides what is behind it where it is");
         assert!(
             strip.depth[index] <= depth[0]
                 && strip.transmittance(index)[0] == if coverage[0] > 0.0 { 0.0 } else { 1.0 }
         );
     }
-    (strip, surfaces.coverage.pixels().as_flattened().to_vec())
+    let mut coverage = vec![0.0; SIZE[0] * SIZE[1]];
+    for (y, row) in surfaces.coverage.pixels().chunks(inside.width.max(1)).enumerate() {
+        coverage[(inside.y + y) * SIZE[0] + inside.x..][..inside.width].copy_from_slice(row.as_flattened());
+    }
+    (strip, coverage)
 }
 
 #[test]

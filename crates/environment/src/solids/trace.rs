@@ -47,6 +47,8 @@ impl Pixel {
 pub(super) struct PreparedSolids {
     /// The pixels that may show one.
     rect: Rect,
+    /// Those that may show one that moves in the picture.
+    moving_rect: Rect,
     pixels: Vec<Pixel>,
     surfaces: OpaqueSurfaces,
 }
@@ -109,7 +111,8 @@ impl PreparedSolids {
         let rects = bounds(&poses, view);
         let rect = rects.iter().fold(Rect::default(), |all, rect| all.union(rect));
         let moving: Vec<Rect> = rects.iter().zip(moves).filter(|(_, moves)| *moves).map(|(rect, _)| *rect).collect();
-        let tracer = Tracer { poses: &poses, shading: Shading::new(surroundings), rects: &rects, moving: &moving };
+        let shading = Shading::new(surroundings);
+        let tracer = Tracer { poses: &poses, shading: &shading, rects: &rects, moving: &moving };
         let corners = tracer.corners(rect, observer)?;
         let mut pixels = vec![Pixel::EMPTY; rect.width * rect.height];
         pixels.par_chunks_mut(rect.width.max(1)).enumerate().try_for_each(|(y, row)| {
@@ -121,15 +124,74 @@ impl PreparedSolids {
             }
             Ok(())
         })?;
-        let filled = |value: f32| Image::filled(view.size[0], view.size[1], [value]);
-        let mut surfaces = OpaqueSurfaces { depth: filled(f32::INFINITY), coverage: filled(0.0) };
-        for (y, row) in pixels.chunks(rect.width.max(1)).enumerate() {
-            for (x, pixel) in row.iter().enumerate().filter(|(_, pixel)| pixel.coverage > 0.0) {
-                surfaces.depth.row_mut(rect.y + y)[rect.x + x] = [pixel.opaque_depth];
-                surfaces.coverage.row_mut(rect.y + y)[rect.x + x] = [pixel.coverage];
+        let moving_rect = moving.iter().fold(Rect::default(), |all, rect| all.union(rect));
+        Ok(Self { rect, moving_rect, surfaces: opaque_surfaces(rect, &pixels), pixels })
+    }
+}
+
+/// The opaque surfaces of the pixels of a rectangle.
+fn opaque_surfaces(rect: Rect, pixels: &[Pixel]) -> OpaqueSurfaces {
+    let filled = |value: f32| Image::filled(rect.width, rect.height, [value]);
+    let mut surfaces = OpaqueSurfaces { rect, depth: filled(f32::INFINITY), coverage: filled(0.0) };
+    let images = surfaces.depth.pixels_mut().iter_mut().zip(surfaces.coverage.pixels_mut());
+    for ((depth, coverage), pixel) in images.zip(pixels).filter(|(_, pixel)| pixel.coverage > 0.0) {
+        *depth = [pixel.opaque_depth];
+        *coverage = [pixel.coverage];
+    }
+    surfaces
+}
+
+/// The obstacles at a moment of an exposure, traced when they are drawn: the pixels of all moments would take gigabytes.
+pub(super) struct UntracedSolids<'a> {
+    pose: Pose<'a>,
+    shading: Shading<'a>,
+    /// The rectangle of the picture that each obstacle may cover.
+    rects: Vec<Rect>,
+    rect: Rect,
+}
+
+impl<'a> UntracedSolids<'a> {
+    /// The obstacles in the middle of the exposure of a view.
+    pub(super) fn new(solids: &'a Solids, view: &View, surroundings: &'a Surroundings<'a>) -> Self {
+        let pose = Pose::new(solids, view, view.shutter.middle());
+        let rects = bounds(std::slice::from_ref(&pose), view);
+        let rect = rects.iter().fold(Rect::default(), |all, rect| all.union(rect));
+        Self { pose, shading: Shading::new(surroundings), rects, rect }
+    }
+
+    /// Traces the pixels of a rectangle.
+    fn trace(&self, rect: Rect) -> PreparedSolids {
+        let rect = rect.intersection(&self.rect);
+        let poses = std::slice::from_ref(&self.pose);
+        let tracer = Tracer { poses, shading: &self.shading, rects: &self.rects, moving: &[] };
+        let mut pixels = Vec::with_capacity(rect.width * rect.height);
+        let mut rows = [vec![None; rect.width + 1], vec![None; rect.width + 1]];
+        if !rect.is_empty() {
+            tracer.corner_row([rect.x, rect.y], &mut rows[1]);
+        }
+        for y in rect.y..rect.bottom() {
+            rows.swap(0, 1);
+            let [upper, lower] = &mut rows;
+            tracer.corner_row([rect.x, y + 1], lower);
+            for x in 0..rect.width {
+                pixels.push(tracer.pixel([rect.x + x, y], [upper[x], upper[x + 1], lower[x], lower[x + 1]]));
             }
         }
-        Ok(Self { rect, pixels, surfaces })
+        PreparedSolids { rect, moving_rect: rect, surfaces: opaque_surfaces(rect, &pixels), pixels }
+    }
+}
+
+impl Prepared for UntracedSolids<'_> {
+    fn bounds(&self, _slice: &DepthInterval) -> Rect {
+        self.rect
+    }
+
+    fn within(&self, rect: Rect) -> Option<Box<dyn Prepared + '_>> {
+        Some(Box::new(self.trace(rect)))
+    }
+
+    fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        self.trace(strip.rect).draw(slice, strip);
     }
 }
 
@@ -138,7 +200,7 @@ type Corner = Option<(usize, DVec3)>;
 
 struct Tracer<'a> {
     poses: &'a [Pose<'a>],
-    shading: Shading<'a>,
+    shading: &'a Shading<'a>,
     /// The pixels of each obstacle.
     rects: &'a [Rect],
     /// Those of each obstacle that moves in the picture.
@@ -166,25 +228,31 @@ impl Tracer<'_> {
         let mut corners = vec![None; width * (rect.height + 1)];
         corners.par_chunks_mut(width).enumerate().try_for_each(|(y, row)| {
             check(observer)?;
-            for (x, corner) in row.iter_mut().enumerate() {
-                let [x, y] = [rect.x + x, rect.y + y];
-                // A corner belongs to four pixels.
-                let is_near = [
-                    [x, y],
-                    [x.saturating_sub(1), y.saturating_sub(1)],
-                    [x, y.saturating_sub(1)],
-                    [x.saturating_sub(1), y],
-                ]
-                .into_iter()
-                .any(|[x, y]| is_in_any(self.rects, x, y));
-                if is_near {
-                    let seen = self.middle().seen(DVec2::new(x as f64, y as f64));
-                    *corner = seen.map(|surface| (surface.index, surface.normal));
-                }
-            }
+            self.corner_row([rect.x, rect.y + y], row);
             Ok(())
         })?;
         Ok(corners)
+    }
+
+    /// The surfaces at corners from column `first` on in row `y`.
+    fn corner_row(&self, [first, y]: [usize; 2], row: &mut [Corner]) {
+        for (x, corner) in row.iter_mut().enumerate() {
+            let x = first + x;
+            // A corner belongs to four pixels.
+            let is_near = [
+                [x, y],
+                [x.saturating_sub(1), y.saturating_sub(1)],
+                [x, y.saturating_sub(1)],
+                [x.saturating_sub(1), y],
+            ]
+            .into_iter()
+            .any(|[x, y]| is_in_any(self.rects, x, y));
+            *corner = None;
+            if is_near {
+                let seen = self.middle().seen(DVec2::new(x as f64, y as f64));
+                *corner = seen.map(|surface| (surface.index, surface.normal));
+            }
+        }
     }
 
     /// A pixel, with the surfaces at its corners.
@@ -247,6 +315,10 @@ impl Tracer<'_> {
 impl Prepared for PreparedSolids {
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
         self.rect
+    }
+
+    fn moving_bounds(&self) -> Rect {
+        self.moving_rect
     }
 
     fn opaque_surfaces(&self) -> Option<&OpaqueSurfaces> {

@@ -120,6 +120,15 @@ impl Accumulator {
     /// Mixes with another composite of some of its pixels: `own_weight` (column and row in the picture) is its own weight, the other's is the rest. AOVs
     /// stay.
     pub(crate) fn mix(&mut self, other: &Self, own_weight: impl Fn(usize, usize) -> f32) {
+        self.mix_where(other, own_weight, |_| true);
+    }
+
+    /// [Mixes](Self::mix) those pixels of which both composites have a share.
+    pub(crate) fn mix_partly(&mut self, other: &Self, own_weight: impl Fn(usize, usize) -> f32) {
+        self.mix_where(other, own_weight, |weight| weight > 0.0 && weight < 1.0);
+    }
+
+    fn mix_where(&mut self, other: &Self, own_weight: impl Fn(usize, usize) -> f32, is_mixed: impl Fn(f32) -> bool) {
         if other.absorbs {
             self.start_absorbing();
         }
@@ -127,6 +136,9 @@ impl Accumulator {
         for from in 0..rect.width * rect.height {
             let [x, y] = [rect.x + from % rect.width, rect.y + from / rect.width];
             let (to, weight) = ((y - self.rect.y) * self.rect.width + x - self.rect.x, own_weight(x, y));
+            if !is_mixed(weight) {
+                continue;
+            }
             let lerp = |own: &mut f32, other: f32| *own = (*own - other).fma(weight, other);
             let transmittance = other.transmittance_at(from);
             for c in 0..3 {
@@ -140,6 +152,50 @@ impl Accumulator {
             }
             self.depth[to] = self.depth[to].min(other.depth[from]);
         }
+    }
+
+    /// Replaces some of its pixels by those of another composite. AOVs stay.
+    pub(crate) fn replace(&mut self, other: &Self) {
+        if other.absorbs {
+            self.start_absorbing();
+        }
+        let rect = other.rect;
+        for row in 0..rect.height {
+            let from = row * rect.width..(row + 1) * rect.width;
+            let first = (rect.y - self.rect.y + row) * self.rect.width + rect.x - self.rect.x;
+            let to = first..first + rect.width;
+            for c in 0..3 {
+                self.color[c][to.clone()].copy_from_slice(&other.color[c][from.clone()]);
+                match (self.absorbs, other.absorbs) {
+                    (_, true) => {
+                        self.transmittance[c][to.clone()].copy_from_slice(&other.transmittance[c][from.clone()]);
+                    }
+                    (true, false) => self.transmittance[c][to.clone()].fill(1.0),
+                    (false, false) => {}
+                }
+            }
+            for (own, other) in self.layers.iter_mut().flatten().zip(other.layers.iter().flatten()) {
+                own[to.clone()].copy_from_slice(&other[from.clone()]);
+            }
+            self.depth[to].copy_from_slice(&other.depth[from]);
+        }
+    }
+
+    /// Adds a composite of the same pixels that shows a fraction `share` of the exposure, to one that contains other fractions of it and nothing else.
+    pub(crate) fn add_share(&mut self, level: Level, other: &Self, share: f32) {
+        for (sum, color) in self.color.iter_mut().zip(&other.color) {
+            dispatch!(level, _simd => add_weighted(sum, color, share));
+        }
+        if other.absorbs {
+            self.start_absorbing();
+            for (sum, transmittance) in self.transmittance.iter_mut().zip(&other.transmittance) {
+                dispatch!(level, _simd => add_weighted_absorption(sum, transmittance, share));
+            }
+        }
+        for (sum, layer) in self.layers.iter_mut().flatten().zip(other.layers.iter().flatten()) {
+            dispatch!(level, _simd => add_weighted(sum, layer, share));
+        }
+        dispatch!(level, _simd => nearest_row(&mut self.depth, &other.depth));
     }
 
     fn add_row(&mut self, level: Level, strip: &Strip, from: usize, to: usize) {
@@ -186,6 +242,16 @@ fn add_light(color: &mut [f32], radiance: &[f32]) {
 }
 
 #[inline(always)]
+fn add_weighted(sum: &mut [f32], values: &[f32], weight: f32) {
+    sum.iter_mut().zip(values).for_each(|(sum, value)| *sum = weight.fma(*value, *sum));
+}
+
+#[inline(always)]
+fn add_weighted_absorption(sum: &mut [f32], transmittance: &[f32], weight: f32) {
+    sum.iter_mut().zip(transmittance).for_each(|(sum, value)| *sum = weight.fma(*value - 1.0, *sum));
+}
+
+#[inline(always)]
 fn nearest_row(nearest: &mut [f32], depth: &[f32]) {
     nearest.iter_mut().zip(depth).for_each(|(old, new)| *old = if *new < *old { *new } else { *old });
 }
@@ -204,5 +270,61 @@ fn absorb_row(color: &mut [f32], transmittance: &mut [f32], radiance: &[f32], ab
     {
         *color = transmittance.fma(*radiance, *color);
         *transmittance *= absorbed;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A composite of two pixels, of which the second has light and absorbs a part.
+    fn composite(light: f32, transmittance: Option<f32>, depth: f32) -> Accumulator {
+        let mut strip = Strip::default();
+        strip.reset(Rect { x: 5, y: 3, width: 2, height: 1 }, None, 0);
+        match transmittance {
+            None => strip.emit(1, [light, 2.0 * light, 0.0], depth),
+            Some(value) => strip.add_behind(1, [light, 2.0 * light, 0.0], [value; 3], depth),
+        }
+        let mut composite = Accumulator::default();
+        composite.reset(strip.rect, 1, &[]);
+        composite.add_behind(bansho_base::math::simd::level(), &strip, 0, &[]);
+        composite
+    }
+
+    #[test]
+    fn shares_of_an_exposure_come_to_their_mean() {
+        let level = bansho_base::math::simd::level();
+        let mut mean = Accumulator::default();
+        mean.reset(Rect { x: 5, y: 3, width: 2, height: 1 }, 1, &[]);
+        for (light, transmittance, depth) in
+            [(4.0, None, 7.0), (8.0, Some(0.5), 6.0), (0.0, Some(0.0), 9.0), (4.0, None, 8.0)]
+        {
+            mean.add_share(level, &composite(light, transmittance, depth), 0.25);
+        }
+        assert_eq!(mean.color, [vec![0.0, 4.0], vec![0.0, 8.0], vec![0.0; 2]]);
+        assert_eq!([0, 1].map(|pixel| mean.transmittance_at(pixel)), [[1.0; 3], [0.625; 3]]);
+        assert_eq!(mean.layers[0][3], [0.0, 0.375], "of the mean transmittance");
+        assert_eq!(mean.depth, [f32::INFINITY, 6.0]);
+    }
+
+    #[test]
+    fn replaced_pixels_do_not_keep_what_was_there() {
+        let mut all = composite(4.0, Some(0.5), 2.0);
+        all.replace(&composite(1.0, None, 3.0));
+        assert_eq!((all.color[1][1], all.transmittance_at(1), all.depth[1]), (2.0, [1.0; 3], 3.0));
+        all.replace(&composite(1.0, Some(0.25), 4.0));
+        assert_eq!(
+            (all.transmittance_at(0), all.transmittance_at(1), all.layers[0][3][1]),
+            ([1.0; 3], [0.25; 3], 0.75)
+        );
+    }
+
+    #[test]
+    fn only_pixels_that_are_covered_partly_are_mixed() {
+        let mut own = composite(4.0, Some(0.5), 2.0);
+        own.mix_partly(&composite(8.0, None, 3.0), |x, _| if x == 6 { 1.0 } else { 0.0 });
+        assert_eq!((own.color[0][1], own.transmittance_at(1)), (4.0, [0.5; 3]));
+        own.mix_partly(&composite(8.0, None, 3.0), |_, _| 0.25);
+        assert_eq!((own.color[0][1], own.transmittance_at(1)), (7.0, [0.875; 3]));
     }
 }

@@ -8,7 +8,7 @@ use bansho_base::{
     image::{Image, Rect},
     phenomenon::{
         PlateRole, Prepared,
-        strip::{Strip, View},
+        strip::{DepthInterval, Strip, View},
     },
 };
 use fearless_simd::Level;
@@ -16,7 +16,8 @@ use fearless_simd::Level;
 use super::{
     accumulate::Accumulator,
     background::{Background, BentPixels},
-    hiding::HidingDepth,
+    hiding::{HidingDepth, HidingRows},
+    moments::{MomentScratch, Moments},
     plate::PlateFrame,
     slices::Slice,
 };
@@ -65,6 +66,8 @@ pub(crate) struct Composition<'a> {
     /// The phenomena, to which members of slices refer.
     pub(crate) runs: &'a [&'a ActiveRun],
     pub(crate) prepared: &'a [Box<dyn Prepared + 'a>],
+    /// Those of the phenomena that move while the shutter is open.
+    pub(crate) moments: &'a Moments<'a>,
     pub(crate) slices: &'a [Slice],
     pub(crate) plate: &'a PlateFrame,
     /// What hides phenomena.
@@ -88,10 +91,8 @@ pub(crate) fn scratches() -> StripScratches {
 /// Scratch memory of one thread.
 #[derive(Default)]
 pub(crate) struct StripScratch {
-    strip: Strip,
     pub(super) accumulator: Accumulator,
-    /// What partly covered pixels show without the opaque surfaces.
-    uncovered: Accumulator,
+    pass: PassScratch,
     /// What transparent pixels of the plate show without the plate.
     unplated: Accumulator,
     /// The refracted pixels of the background.
@@ -100,6 +101,17 @@ pub(crate) struct StripScratch {
     pub(super) row: Vec<[f32; 4]>,
     /// The light of a strip of which only display codes are kept.
     pub(super) light: Vec<[f32; 4]>,
+}
+
+/// Scratch memory of a pass.
+#[derive(Default)]
+struct PassScratch {
+    strip: Strip,
+    /// What partly covered pixels show without the opaque surfaces.
+    uncovered: Accumulator,
+    /// A cell of a strip in which several things move.
+    cell: Accumulator,
+    moments: MomentScratch,
 }
 
 impl<'a> Composition<'a> {
@@ -143,7 +155,7 @@ impl<'a> Composition<'a> {
         self.plate.color.is_some() && !self.plate.is_transparent && self.view.overscan == 0
     }
 
-    fn layer_count(&self) -> usize {
+    pub(super) fn layer_count(&self) -> usize {
         if self.outputs.layers { self.runs.len() } else { 0 }
     }
 
@@ -157,13 +169,43 @@ impl<'a> Composition<'a> {
     /// Draws the slices within `rect` into the accumulator of `scratch`, nearest first. Where the plate is transparent, what those pixels show without the
     /// plate is mixed in.
     pub(super) fn accumulate(&self, level: Level, rect: Rect, scratch: &mut StripScratch) {
-        let StripScratch { strip, accumulator, uncovered, unplated, .. } = scratch;
-        self.accumulate_covered(level, rect, Pass::before_plate(self), strip, uncovered, accumulator);
+        let StripScratch { accumulator, pass, unplated, .. } = scratch;
+        self.accumulate_exposure(level, rect, Pass::before_plate(self), pass, accumulator);
         let (Some(hiding), Some(color)) = (self.through, &self.plate.color) else { return };
         let transparency = |x: usize, y: usize| 1.0 - color.at(x, y)[3];
         let Some(clear) = transparent_rect(rect, transparency) else { return };
-        self.accumulate_covered(level, clear, Pass::without_plate(hiding), strip, uncovered, unplated);
+        self.accumulate_exposure(level, clear, Pass::without_plate(hiding), pass, unplated);
         accumulator.add_through(unplated, transparency);
+    }
+
+    /// Draws the slices within `rect` into an accumulator: where several things move, as the mean of the moments of the exposure. AOVs are always those of
+    /// phenomena as wholes.
+    fn accumulate_exposure(
+        &self,
+        level: Level,
+        rect: Rect,
+        pass: Pass,
+        scratch: &mut PassScratch,
+        accumulator: &mut Accumulator,
+    ) {
+        let PassScratch { strip, uncovered, cell: drawn, moments } = scratch;
+        let cells = self.moments.cells(rect);
+        let has_aovs = self.outputs.aovs && pass.with_aovs;
+        if cells.is_empty() || has_aovs {
+            self.accumulate_covered(level, rect, pass, strip, uncovered, accumulator);
+        } else {
+            accumulator.reset(rect, self.layer_count(), &[]);
+        }
+        for cell in &cells {
+            if cell.is_drawn_by_moments() {
+                self.accumulate_moments(level, cell, pass, moments, drawn);
+            } else if has_aovs {
+                continue;
+            } else {
+                self.accumulate_covered(level, cell.rect, pass, strip, uncovered, drawn);
+            }
+            accumulator.replace(drawn);
+        }
     }
 
     /// Draws the slices within `rect` into an accumulator. Where opaque surfaces cover pixels partly, what those show without the surfaces is mixed in.
@@ -189,9 +231,8 @@ impl<'a> Composition<'a> {
         accumulator.reset(rect, self.layer_count(), &aovs);
         for slice in self.slices {
             for &member in &slice.members {
-                let prepared = &self.prepared[member];
-                let is_left_out = !pass.with_opaque && pass.hiding.is_opaque(member);
-                if is_left_out || Some(prepared.plate_role()) == pass.skipped {
+                let prepared = self.prepared[member].as_ref();
+                if pass.leaves_out(prepared, member, pass.with_opaque) {
                     continue;
                 }
                 let aov_count = aovs.get(member).copied().unwrap_or(0);
@@ -201,25 +242,39 @@ impl<'a> Composition<'a> {
                 }
                 // AOV planes are added as a whole, so strips with AOVs have the full size.
                 let drawn = if aov_count > 0 { rect } else { touched };
-                match pass.hiding.depth_for(member, pass.with_opaque, pass.plate_depth) {
-                    Some(image) => strip.reset(drawn, Some(&|y| image.row(y).as_flattened()), aov_count),
-                    None => strip.reset(drawn, None, aov_count),
-                }
-                {
-                    let _part = self.begin_part(Some(self.runs[member].info().name));
-                    prepared.draw(&slice.interval, strip);
-                }
+                let depth = pass.hiding.depth_for(member, pass.with_opaque, pass.plate_depth);
+                self.draw_member(member, prepared, &slice.interval, drawn, depth, aov_count, strip);
                 accumulator.add_behind(level, strip, member, self.runs[member].info().aovs);
             }
         }
+    }
+
+    /// Draws what is prepared of a member in a slice into `strip`, over the pixels of `rect`.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn draw_member(
+        &self,
+        member: usize,
+        prepared: &dyn Prepared,
+        slice: &DepthInterval,
+        rect: Rect,
+        hidden_from: Option<HidingRows>,
+        aovs: usize,
+        strip: &mut Strip,
+    ) {
+        strip.reset(rect, None, aovs);
+        if let Some(rows) = hidden_from {
+            strip.hide_beyond(|y| rows.row(rect, y));
+        }
+        let _part = self.begin_part(Some(self.runs[member].info().name));
+        prepared.draw(slice, strip);
     }
 }
 
 /// Which phenomena are drawn, and what hides them.
 #[derive(Clone, Copy)]
-struct Pass<'a> {
-    hiding: &'a HidingDepth,
-    plate_depth: Option<&'a Image<1>>,
+pub(super) struct Pass<'a> {
+    pub(super) hiding: &'a HidingDepth,
+    pub(super) plate_depth: Option<&'a Image<1>>,
     /// Phenomena of this role are left out.
     skipped: Option<PlateRole>,
     /// Whether there are opaque surfaces.
@@ -234,6 +289,11 @@ impl<'a> Pass<'a> {
         let (hiding, plate) = (composition.hiding, composition.plate);
         let skipped = plate.color.as_ref().map(|_| PlateRole::Behind);
         Self { hiding, plate_depth: plate.depth.as_ref(), skipped, with_opaque: true, with_aovs: true }
+    }
+
+    /// Whether a member is not drawn, with opaque surfaces or without.
+    pub(super) fn leaves_out(&self, prepared: &dyn Prepared, member: usize, with_opaque: bool) -> bool {
+        (!with_opaque && self.hiding.is_opaque(member)) || Some(prepared.plate_role()) == self.skipped
     }
 
     /// What is seen without the plate.

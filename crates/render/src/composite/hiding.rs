@@ -21,28 +21,38 @@ pub(crate) struct HidingDepth {
 
 impl HidingDepth {
     /// That of the prepared phenomena through the transparency of a plate; `None` where nothing can be seen through it.
-    pub(crate) fn through(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame) -> Option<Self> {
+    pub(crate) fn through(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame, size: [usize; 2]) -> Option<Self> {
         let is_behind = |each: &dyn Prepared| plate.depth.is_some() || each.plate_role() == PlateRole::Behind;
         let is_seen = plate.is_transparent && prepared.iter().any(|each| is_behind(each.as_ref()));
-        is_seen.then(|| Self::new(prepared, &PlateFrame::default()))
+        is_seen.then(|| Self::new(prepared, &PlateFrame::default(), size))
     }
 
-    /// That of the prepared phenomena in front of a plate.
-    pub(crate) fn new(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame) -> Self {
+    /// That of the prepared phenomena in front of a plate, in a picture of `size` pixels.
+    pub(crate) fn new(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame, size: [usize; 2]) -> Self {
+        let surfaces = prepared.iter().map(|each| each.opaque_surfaces());
+        Self::of_surfaces(surfaces, plate.depth.as_ref(), Rect::from_size(size[0], size[1]))
+    }
+
+    /// That of the opaque surfaces of all members, in front of a plate of this depth, in the pixels of `rect`.
+    pub(super) fn of_surfaces<'a>(
+        surfaces: impl Iterator<Item = Option<&'a OpaqueSurfaces>>,
+        plate_depth: Option<&Image<1>>,
+        rect: Rect,
+    ) -> Self {
         let mut hiding = Self::default();
-        for (member, each) in prepared.iter().enumerate() {
-            let Some(surfaces) = each.opaque_surfaces() else { continue };
+        for (member, surfaces) in surfaces.enumerate() {
+            let Some(surfaces) = surfaces else { continue };
             hiding.opaque.push(member);
-            match &mut hiding.nearest {
-                None => hiding.nearest = Some(surfaces.clone()),
-                Some(nearest) => {
-                    combine(&mut nearest.depth, &surfaces.depth, f32::min);
-                    combine(&mut nearest.coverage, &surfaces.coverage, f32::max);
-                }
-            }
+            let nearest = hiding.nearest.get_or_insert_with(|| {
+                let filled = |value: f32| Image::filled(rect.width, rect.height, [value]);
+                OpaqueSurfaces { rect, depth: filled(f32::INFINITY), coverage: filled(0.0) }
+            });
+            let from = surfaces.rect;
+            combine(&mut nearest.depth, rect, &surfaces.depth, from, f32::min);
+            combine(&mut nearest.coverage, rect, &surfaces.coverage, from, f32::max);
         }
-        if let (Some(nearest), Some(depth)) = (&mut hiding.nearest, &plate.depth) {
-            combine(&mut nearest.depth, depth, f32::min);
+        if let (Some(nearest), Some(depth)) = (&mut hiding.nearest, plate_depth) {
+            combine(&mut nearest.depth, rect, depth, Rect::from_size(depth.width(), depth.height()), f32::min);
         }
         hiding
     }
@@ -53,9 +63,10 @@ impl HidingDepth {
         member: usize,
         with_opaque: bool,
         plate_depth: Option<&'a Image<1>>,
-    ) -> Option<&'a Image<1>> {
+    ) -> Option<HidingRows<'a>> {
         let surfaces = self.nearest.as_ref().filter(|_| with_opaque && !self.is_opaque(member));
-        surfaces.map(|surfaces| &surfaces.depth).or(plate_depth)
+        let surfaces = surfaces.map(|surfaces| HidingRows { depth: &surfaces.depth, origin: surfaces.rect });
+        surfaces.or(plate_depth.map(|depth| HidingRows { depth, origin: Rect::default() }))
     }
 
     /// Whether a phenomenon has opaque surfaces.
@@ -65,7 +76,9 @@ impl HidingDepth {
 
     /// Fraction of a pixel that opaque surfaces cover.
     pub(crate) fn coverage(&self, x: usize, y: usize) -> f32 {
-        self.nearest.as_ref().map_or(0.0, |surfaces| surfaces.coverage.at(x, y)[0])
+        self.nearest
+            .as_ref()
+            .map_or(0.0, |OpaqueSurfaces { rect, coverage, .. }| coverage.at(x - rect.x, y - rect.y)[0])
     }
 
     /// Rectangles within the strip `rect` that contain all pixels that opaque surfaces cover partly.
@@ -85,8 +98,27 @@ impl HidingDepth {
     }
 }
 
-/// Combines the pixels of an image with those of another one of the same size.
-fn combine(image: &mut Image<1>, other: &Image<1>, operation: fn(f32, f32) -> f32) {
-    let pixels = image.pixels_mut().iter_mut().zip(other.pixels());
-    pixels.for_each(|(pixel, other)| pixel[0] = operation(pixel[0], other[0]));
+/// Depths beyond which a phenomenon is hidden.
+#[derive(Clone, Copy)]
+pub(crate) struct HidingRows<'a> {
+    depth: &'a Image<1>,
+    /// Where the image begins in the picture.
+    origin: Rect,
+}
+
+impl<'a> HidingRows<'a> {
+    /// Depths of the columns of `rect` in row `y` of the picture, m.
+    pub(super) fn row(&self, rect: Rect, y: usize) -> &'a [f32] {
+        &self.depth.row(y - self.origin.y).as_flattened()[rect.x - self.origin.x..][..rect.width]
+    }
+}
+
+/// Combines the pixels of an image with those of another one that are in both of their rectangles of the picture.
+fn combine(image: &mut Image<1>, rect: Rect, other: &Image<1>, other_rect: Rect, operation: fn(f32, f32) -> f32) {
+    let both = rect.intersection(&other_rect);
+    for y in both.y..both.bottom() {
+        let pixels = &mut image.row_mut(y - rect.y)[both.x - rect.x..][..both.width];
+        let others = &other.row(y - other_rect.y)[both.x - other_rect.x..][..both.width];
+        pixels.iter_mut().zip(others).for_each(|(pixel, other)| pixel[0] = operation(pixel[0], other[0]));
+    }
 }

@@ -7,6 +7,7 @@ pub(crate) mod composition;
 mod frame_memory;
 pub(crate) mod hiding;
 pub(crate) mod mirror;
+pub(crate) mod moments;
 pub(crate) mod plate;
 pub(crate) mod plate_cache;
 mod plate_light;

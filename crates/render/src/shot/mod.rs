@@ -32,6 +32,7 @@ use crate::{
         composition::{self, Composition, Outputs, StripScratches},
         hiding::HidingDepth,
         mirror::Mirror,
+        moments::{Moments, MovingMember},
         plate::PlateFrame,
         plate_cache::PlateCache,
         refraction,
@@ -40,7 +41,7 @@ use crate::{
     },
     context::ShotContext,
     display::{DisplayFrame, DisplayOptions},
-    exposure_parts::{self, ExposurePart},
+    exposure_parts::{self, ExposureParts, PartCount, PreparedExposure},
     plan::Plan,
 };
 
@@ -326,7 +327,7 @@ impl Shot {
         let runs: Vec<&ActiveRun> = self.runs.iter().collect();
         let parts = self.exposure_parts(&all, view, &surroundings, publications);
         let inputs = PreparationInputs { view, surroundings: &surroundings, parts: &parts, is_mirrored: false };
-        let PreparedSlices { slices, prepared } = self.prepare(&all, inputs, observer)?;
+        let PreparedSlices { slices, prepared, moments } = self.prepare(&all, inputs, observer)?;
         drop(preparing);
         let _stage = StageGuard::begin(observer, Stage::Draw);
         observer::check(observer)?;
@@ -339,7 +340,7 @@ impl Shot {
         }
         let is_refracted = has_background && prepared.iter().any(|prepared| prepared.deflection().is_some());
         let outputs = Outputs::of_plan(&self.context.plan);
-        let through = HidingDepth::through(&prepared, plate);
+        let through = HidingDepth::through(&prepared, plate, view.size);
         let composition = Composition {
             // What is nearer than refracting air is not refracted.
             outputs: Outputs { depth: outputs.depth || is_refracted, ..outputs },
@@ -348,9 +349,10 @@ impl Shot {
             view,
             runs: &runs,
             prepared: &prepared,
+            moments: &moments,
             slices: &slices,
             plate,
-            hiding: &HidingDepth::new(&prepared, plate),
+            hiding: &HidingDepth::new(&prepared, plate, view.size),
             through: through.as_ref(),
             background: Background::plate(plate),
             scratches: &self.scratches,
@@ -390,23 +392,57 @@ impl Shot {
         let intervals: Vec<_> = each()
             .map(|(run, surroundings, parts)| {
                 let _part = begin_preparation(run, is_mirrored, observer);
-                match parts.as_slice() {
-                    [] => run.run.depth_intervals(view, surroundings),
-                    parts => exposure_parts::depth_intervals(&*run.run, parts),
-                }
+                parts.depth_intervals(&*run.run, view, surroundings)
             })
             .collect();
-        let prepared = each()
+        let prepared: Vec<PreparedExposure> = each()
             .map(|(run, surroundings, parts)| {
                 let _part = begin_preparation(run, is_mirrored, observer);
-                match parts.as_slice() {
-                    [] => run.run.prepare(view, surroundings, observer),
-                    parts => exposure_parts::prepare(&*run.run, run.built.phenomenon.info().aovs, parts, observer),
-                }
+                let aovs = run.built.phenomenon.info().aovs;
+                exposure_parts::prepare(&*run.run, aovs, view, surroundings, parts, observer)
             })
             .collect::<Result<_, _>>()?;
         let names = self.table_names(which);
-        Ok(PreparedSlices { slices: slices::cut(&intervals, &names), prepared })
+        let (prepared, moments) = self.moments(which, prepared, inputs, observer)?;
+        Ok(PreparedSlices { slices: slices::cut(&intervals, &names), prepared, moments })
+    }
+
+    /// The wholes of prepared phenomena, and the moments of those that move. What blurs itself is prepared in parts where another one moves over its pixels.
+    fn moments<'a>(
+        &'a self,
+        which: &[usize],
+        prepared: Vec<PreparedExposure<'a>>,
+        inputs: PreparationInputs<'a>,
+        observer: &dyn Observer,
+    ) -> Result<(Vec<Box<dyn Prepared + 'a>>, Moments<'a>), RenderError> {
+        let PreparationInputs { parts, is_mirrored, .. } = inputs;
+        let moving = |(exposure, &index): (&PreparedExposure, &usize)| {
+            if parts[index].parts.is_empty() { Rect::default() } else { exposure.whole.moving_bounds() }
+        };
+        let rects: Vec<Rect> = prepared.iter().zip(which).map(moving).collect();
+        let is_crossed = |member: usize| {
+            let others = rects.iter().enumerate().filter(|(other, _)| *other != member);
+            others.into_iter().any(|(_, other)| !other.intersection(&rects[member]).is_empty())
+        };
+        let members = prepared.into_par_iter().enumerate().map(
+            |(member, PreparedExposure { whole, parts: mut parts_of_whole })| {
+                let exposure = &parts[which[member]];
+                if exposure.blurs_itself && is_crossed(member) {
+                    let run = &self.runs[which[member]];
+                    let _part = begin_preparation(run, is_mirrored, observer);
+                    parts_of_whole = exposure_parts::prepare_parts(&*run.run, exposure, observer)?;
+                }
+                let moving = (!parts_of_whole.is_empty()).then(|| MovingMember {
+                    member,
+                    parts: parts_of_whole,
+                    rect: rects[member],
+                });
+                Ok((whole, moving))
+            },
+        );
+        let members: Vec<(Box<dyn Prepared>, Option<MovingMember>)> = members.collect::<Result<_, Cancelled>>()?;
+        let (wholes, moving): (Vec<_>, Vec<_>) = members.into_iter().unzip();
+        Ok((wholes, Moments::new(moving.into_iter().flatten().collect())))
     }
 
     /// The names of those phenomena that have a table of their own; `None` for the tables that phenomena share.
@@ -424,9 +460,13 @@ impl Shot {
         view: &View,
         surroundings: &[Surroundings<'a>],
         publications: &[Publication],
-    ) -> Vec<Vec<ExposurePart<'a>>> {
-        let mut parts: Vec<Vec<ExposurePart>> = (0..self.runs.len()).map(|_| Vec::new()).collect();
+    ) -> Vec<ExposureParts<'a>> {
+        let mut counts = vec![PartCount::default(); self.runs.len()];
         for &index in which {
+            counts[index] = PartCount::of_run(&*self.runs[index].run, view, &surroundings[index]);
+        }
+        exposure_parts::nest(&mut counts);
+        let parts = |(index, count): (usize, PartCount)| {
             let surroundings = &surroundings[index];
             let of_part = |part: &View| {
                 let mut surroundings = surroundings.clone();
@@ -438,9 +478,9 @@ impl Shot {
                 }
                 surroundings
             };
-            parts[index] = exposure_parts::exposure_parts(&*self.runs[index].run, view, surroundings, of_part);
-        }
-        parts
+            ExposureParts::new(count, view, of_part)
+        };
+        counts.into_iter().enumerate().map(parts).collect()
     }
 
     /// The shadow casters around phenomenon `index` during `part` of the exposure.
@@ -515,7 +555,7 @@ struct PreparationInputs<'a> {
     /// Those of each phenomenon.
     surroundings: &'a [Surroundings<'a>],
     /// The parts of the exposure in which each phenomenon is prepared.
-    parts: &'a [Vec<ExposurePart<'a>>],
+    parts: &'a [ExposureParts<'a>],
     /// Whether it is the reflection in a mirror.
     is_mirrored: bool,
 }
@@ -556,6 +596,7 @@ fn draw_light(
 struct PreparedSlices<'a> {
     slices: Vec<Slice>,
     prepared: Vec<Box<dyn Prepared + 'a>>,
+    moments: Moments<'a>,
 }
 
 /// The region `window` of a whole frame.

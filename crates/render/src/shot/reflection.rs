@@ -92,7 +92,7 @@ impl Shot {
         let runs: Vec<&ActiveRun> = others.iter().map(|&index| &self.runs[index]).collect();
         let parts = self.exposure_parts(&others, view, &surroundings, publications);
         let inputs = PreparationInputs { view, surroundings: &surroundings, parts: &parts, is_mirrored: true };
-        let PreparedSlices { slices, prepared } = self.prepare(&others, inputs, observer)?;
+        let PreparedSlices { slices, prepared, moments } = self.prepare(&others, inputs, observer)?;
         let composition = Composition {
             outputs: Outputs::RADIANCE,
             is_mirrored: true,
@@ -100,9 +100,10 @@ impl Shot {
             view,
             runs: &runs,
             prepared: &prepared,
+            moments: &moments,
             slices: &slices,
             plate: mirrored,
-            hiding: &HidingDepth::new(&prepared, mirrored),
+            hiding: &HidingDepth::new(&prepared, mirrored, view.size),
             // The sky is composited behind it.
             through: None,
             background: Background::plate(mirrored),

@@ -7,7 +7,7 @@ use bansho_base::{
     parameters::ProblemKind,
     phenomenon::SharedMemory,
 };
-use bansho_render::{CompiledScene, Plan, display::BitDepth};
+use bansho_render::{CompiledScene, Plan, display::BitDepth, moment_bytes_per_thread};
 
 use crate::job::{
     error::{JobError, OptionError},
@@ -110,7 +110,14 @@ pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: Me
     let (drawn, whole) =
         (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
-    per_pixel.total(drawn, whole) + phenomena_bytes(compiled, plan, drawn) + plate_file_bytes(compiled) + PROCESS_BYTES
+    per_pixel.total(drawn, whole) + phenomena_bytes(compiled, plan, drawn) + fixed_picture_bytes(compiled, plan)
+}
+
+/// Memory of the file of a plate, of the moments of exposures, and of the process, bytes.
+fn fixed_picture_bytes(compiled: &CompiledScene, plan: &Plan) -> f64 {
+    let layers = if plan.layers { compiled.phenomena().count() } else { 0 };
+    let moments = moment_bytes_per_thread(&plan.view(plan.frames().start), layers);
+    plate_file_bytes(compiled) + rayon::current_num_threads() as f64 * moments + PROCESS_BYTES
 }
 
 /// Memory of all phenomena for a picture of `drawn` pixels, bytes. What several of them share counts once.
@@ -198,7 +205,7 @@ pub(crate) fn check(
 
 /// Memory that does not depend on the size of the picture, bytes.
 fn fixed_bytes(compiled: &CompiledScene, plan: &Plan) -> f64 {
-    phenomena_bytes(compiled, plan, 0.0) + plate_file_bytes(compiled) + PROCESS_BYTES
+    phenomena_bytes(compiled, plan, 0.0) + fixed_picture_bytes(compiled, plan)
 }
 
 /// Checks that the phenomena fit into memory whatever the size of the picture.

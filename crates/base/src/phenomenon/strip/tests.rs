@@ -145,3 +145,29 @@ fn the_path_of_a_point_is_that_of_its_image() {
     assert!(path(&panned, 2.0) < 1e-3, "what the camera follows stands still: {}", path(&panned, 2.0));
     assert_eq!([parts_of_motion(0.0, 1.0, 8), parts_of_motion(2.1, 1.0, 8), parts_of_motion(99.0, 1.0, 8)], [1, 3, 8]);
 }
+
+#[test]
+fn selected_pixels_are_those_of_the_second_strip() {
+    let mut strips = [Strip::default(), Strip::default()];
+    for strip in &mut strips {
+        strip.reset(Rect { x: 4, y: 2, width: 2, height: 2 }, None, 0);
+    }
+    let [first, second] = &mut strips;
+    first.add_behind(1, [1.0; 3], [0.5; 3], 3.0);
+    second.add_behind(3, [2.0, 3.0, 4.0], [0.1, 0.2, 0.3], 5.0);
+    let mut selected = Strip::default();
+    selected.select(first, second, |x, y| (x, y) == (5, 3));
+    assert_eq!(selected.rect, first.rect);
+    assert_eq!(selected.radiance[1], [0.0, 1.0, 0.0, 3.0]);
+    assert_eq!([1, 2, 3].map(|index| selected.transmittance(index)), [[0.5; 3], [1.0; 3], [0.1, 0.2, 0.3]]);
+    assert_eq!(selected.depth, [f32::INFINITY, 3.0, f32::INFINITY, 5.0]);
+    selected.select(second, first, |_, _| false);
+    assert_eq!(selected.transmittance(3), [0.1, 0.2, 0.3], "{selected:?}");
+}
+
+#[test]
+fn long_exposures_may_have_more_parts() {
+    let parts = |duration: f64| Shutter { open: 1.0, close: 1.0 + duration }.max_parts();
+    assert_eq!([0.0, 1.0 / 48.0, 1.0 / 24.0, 0.25, 8.0].map(parts), [32, 32, 32, 128, 128]);
+    assert!((40..=80).contains(&parts(1.0 / 16.0)));
+}

@@ -9,9 +9,10 @@ use bansho_base::{
 use super::time_samples::MAX_SCROLL;
 use crate::sheet::model::{FlameInstance, FlameSheet};
 
-/// Motion between the parts of an exposure, pixels.
+/// Motion between the parts of an exposure, pixels; and where the motion is long.
 const PIXELS_PER_PART: f64 = 0.5;
-/// Most parts of an exposure.
+const PIXELS_PER_PART_IF_LONG: f64 = 1.0;
+/// Most parts of an exposure, unless the motion is long.
 const MAX_PARTS: usize = 32;
 /// Exposure time up to which a flame keeps its form but for the rise of its gas, s; and length of the parts of longer exposures.
 const KEEPS_FORM_S: f64 = 1.0 / 24.0;
@@ -35,7 +36,12 @@ impl FlameSheet {
             1
         } else {
             let at = |fraction: f64| cameras.path_pixels(|t| self.base(flame, t) + DVec3::Y * (fraction * height));
-            parts_of_motion([0.0, 0.5, 1.0].map(at).into_iter().fold(0.0, f64::max), PIXELS_PER_PART, MAX_PARTS)
+            let motion = [0.0, 0.5, 1.0].map(at).into_iter().fold(0.0, f64::max);
+            parts_of_motion(motion, PIXELS_PER_PART, MAX_PARTS).max(parts_of_motion(
+                motion,
+                PIXELS_PER_PART_IF_LONG,
+                view.shutter.max_parts(),
+            ))
         };
         let middle = self.base(flame, view.shutter.middle()) + DVec3::Y * (0.5 * height);
         let distance = (middle - view.camera.position).length().max(view.camera.near);

@@ -1,0 +1,331 @@
+//! Things that move over the same pixels while the shutter is open, composited at each moment of the exposure.
+//!
+//! Compositing is linear in each of its members: where only one of them moves, the mean of its parts, composited with all others, is the mean of the
+//! composites. Where two move, it is not: things that pass through the same pixel one after the other would hide each other. There the exposure is cut into
+//! moments, each of which shows one part of every member, and the composites of the moments are averaged.
+//!
+//! Slices are drawn from near to far, and each part of a member is composited at once into all moments that it belongs to. So each part is drawn once for
+//! each slice, and members without parts once for all moments.
+
+use std::{ops::Range, sync::Arc};
+
+use bansho_base::{
+    image::Rect,
+    phenomenon::{
+        Prepared,
+        strip::{Strip, View},
+    },
+};
+use fearless_simd::Level;
+
+use super::{
+    accumulate::Accumulator,
+    composition::{Composition, Pass, STRIP_ROWS},
+    hiding::HidingDepth,
+};
+
+/// Most columns that are drawn at once: few enough that the planes of 32 moments fit in the L2 cache of a core.
+const TILE_COLUMNS: usize = 128;
+
+/// The moving members of a composition.
+#[derive(Default)]
+pub(crate) struct Moments<'a>(Vec<MovingMember<'a>>);
+
+/// A member that is prepared in parts.
+pub(crate) struct MovingMember<'a> {
+    /// Index of the member.
+    pub(crate) member: usize,
+    /// Its parts: the largest number of parts of all members is a multiple of theirs.
+    pub(crate) parts: Vec<Arc<dyn Prepared + 'a>>,
+    /// The pixels in which it moves.
+    pub(crate) rect: Rect,
+}
+
+/// A rectangle of a strip in which the same members move.
+#[derive(Debug, PartialEq)]
+pub(super) struct Cell {
+    pub(super) rect: Rect,
+    /// Positions in the list of moving members, two or more; empty if fewer move.
+    moving: Vec<usize>,
+}
+
+impl Cell {
+    /// Whether several members move in it.
+    pub(super) fn is_drawn_by_moments(&self) -> bool {
+        !self.moving.is_empty()
+    }
+}
+
+impl<'a> Moments<'a> {
+    /// The moments of the members that move.
+    pub(crate) fn new(moving: Vec<MovingMember<'a>>) -> Self {
+        Self(moving)
+    }
+
+    /// The cells of a strip; none if at most one member moves in any of its pixels.
+    pub(super) fn cells(&self, strip: Rect) -> Vec<Cell> {
+        let rects: Vec<Rect> = self.0.iter().map(|moving| moving.rect).collect();
+        cells(&rects, strip)
+    }
+}
+
+/// The cells of a strip over which the rectangles of moving members extend; none if no two of them overlap there.
+///
+/// Which members move in a pixel, and so its bits, must not depend on the strip or the crop.
+fn cells(moving: &[Rect], strip: Rect) -> Vec<Cell> {
+    let moving: Vec<(usize, Rect)> =
+        moving.iter().map(|rect| rect.intersection(&strip)).enumerate().filter(|(_, rect)| !rect.is_empty()).collect();
+    let overlap = |(index, rect): (usize, &(usize, Rect))| {
+        moving[..index].iter().any(|(_, other)| !rect.1.intersection(other).is_empty())
+    };
+    if !moving.iter().enumerate().any(overlap) {
+        return Vec::new();
+    }
+    let edges = |[first, end]: [usize; 2], ends: fn(&Rect) -> [usize; 2]| {
+        let mut edges: Vec<usize> = moving.iter().flat_map(|(_, rect)| ends(rect)).chain([first, end]).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        edges
+    };
+    let rows = edges([strip.y, strip.bottom()], |rect| [rect.y, rect.bottom()]);
+    let columns = edges([strip.x, strip.right()], |rect| [rect.x, rect.right()]);
+    let mut cells: Vec<Cell> = Vec::new();
+    for rows in rows.windows(2) {
+        let first = cells.len();
+        for columns in columns.windows(2) {
+            let rect = Rect { x: columns[0], y: rows[0], width: columns[1] - columns[0], height: rows[1] - rows[0] };
+            let inside = moving.iter().filter(|(_, moving)| !moving.intersection(&rect).is_empty());
+            let mut inside: Vec<usize> = inside.map(|(index, _)| *index).collect();
+            if inside.len() < 2 {
+                inside.clear();
+            }
+            match cells[first..].last_mut() {
+                Some(last) if last.moving == inside => last.rect.width += rect.width,
+                _ => cells.push(Cell { rect, moving: inside }),
+            }
+        }
+    }
+    cells.into_iter().flat_map(tiles).collect()
+}
+
+/// A cell cut into tiles, if it is drawn by moments.
+fn tiles(cell: Cell) -> Vec<Cell> {
+    if !cell.is_drawn_by_moments() {
+        return vec![cell];
+    }
+    let Cell { rect, moving } = cell;
+    let tile = |index: usize| {
+        let tile = Rect { x: index * TILE_COLUMNS, width: TILE_COLUMNS, ..rect };
+        Cell { rect: tile.intersection(&rect), moving: moving.clone() }
+    };
+    (rect.x / TILE_COLUMNS..rect.right().div_ceil(TILE_COLUMNS)).map(tile).collect()
+}
+
+/// Scratch memory of one thread.
+#[derive(Default)]
+pub(super) struct MomentScratch {
+    /// The composite of each moment.
+    moments: Vec<Accumulator>,
+    /// What partly covered pixels show in each moment without the opaque surfaces.
+    uncovered: Vec<Accumulator>,
+    /// What is drawn of a member; where obstacles hide it at some moments, with them and without them.
+    strips: [Strip; 3],
+}
+
+/// Memory of the moments of an exposure for each thread, bytes, if the camera moves, so that many things do. With `layers` layers.
+pub fn moment_bytes_per_thread(view: &View, layers: usize) -> f64 {
+    /// Bytes of a pixel of two composites and of the traced obstacles; and of a layer in both composites.
+    const MOMENT_BYTES: f64 = 2.0 * 28.0 + 32.0;
+    const LAYER_BYTES: f64 = 2.0 * 16.0;
+    if view.path_cameras().is_still() {
+        return 0.0;
+    }
+    let pixels = (view.shutter.max_parts() * TILE_COLUMNS * STRIP_ROWS) as f64;
+    pixels * (MOMENT_BYTES + LAYER_BYTES * layers as f64)
+}
+
+/// What the members of a composition show in a cell.
+struct CellMembers<'a> {
+    /// Number of moments.
+    count: usize,
+    /// The parts of each member; a single one if it does not move.
+    parts: Vec<Vec<&'a dyn Prepared>>,
+}
+
+/// The moments, of `count`, in one of `pieces` equal pieces.
+fn moments_of(piece: usize, pieces: usize, count: usize) -> Range<usize> {
+    piece * count / pieces..(piece + 1) * count / pieces
+}
+
+/// Those of the parts that are computed when they are drawn, for the pixels of `rect`.
+fn parts_within<'a>(parts: &'a [Arc<dyn Prepared + '_>], rect: Rect) -> Vec<Option<Box<dyn Prepared + 'a>>> {
+    parts.iter().map(|part| part.within(rect)).collect()
+}
+
+impl Composition<'_> {
+    /// Draws the slices in a cell into `mean`, as the mean of all moments.
+    pub(super) fn accumulate_moments(
+        &self,
+        level: Level,
+        cell: &Cell,
+        pass: Pass,
+        scratch: &mut MomentScratch,
+        mean: &mut Accumulator,
+    ) {
+        let rect = cell.rect;
+        let moving: Vec<&MovingMember> = cell.moving.iter().map(|&index| &self.moments.0[index]).collect();
+        let count = moving.iter().map(|moving| moving.parts.len()).max().unwrap_or(1);
+        let computed: Vec<_> = moving.iter().map(|moving| parts_within(&moving.parts, rect)).collect();
+        let mut parts: Vec<Vec<&dyn Prepared>> = self.prepared.iter().map(|whole| vec![whole.as_ref()]).collect();
+        for (moving, computed) in moving.iter().zip(&computed) {
+            let each = moving.parts.iter().zip(computed);
+            parts[moving.member] =
+                each.map(|(part, computed)| computed.as_deref().unwrap_or_else(|| part.as_ref())).collect();
+        }
+        let opaque = moving.iter().filter(|moving| pass.hiding.is_opaque(moving.member));
+        let hiding_parts = opaque.map(|moving| moving.parts.len()).max().unwrap_or(0);
+        let surfaces = |part: usize| {
+            let surfaces = parts.iter().map(|parts| parts[part * parts.len() / hiding_parts].opaque_surfaces());
+            HidingDepth::of_surfaces(surfaces, pass.plate_depth, rect)
+        };
+        let moving_hiding: Vec<HidingDepth> = (0..hiding_parts).map(surfaces).collect();
+        let hiding: Vec<&HidingDepth> =
+            if hiding_parts == 0 { vec![pass.hiding] } else { moving_hiding.iter().collect() };
+        let members = CellMembers { count, parts };
+        let MomentScratch { moments, uncovered, strips } = scratch;
+        for accumulators in [&mut *moments, &mut *uncovered] {
+            accumulators.resize_with(accumulators.len().max(count), Accumulator::default);
+        }
+        let covered = &mut moments[..count];
+        self.draw_moments(level, rect, &members, Some(&hiding), pass, strips, covered);
+        let edges = hiding.iter().flat_map(|hiding| hiding.edges(rect));
+        let edge_hull = edges.fold(Rect::default(), |all, edge| all.union(&edge));
+        if !edge_hull.is_empty() {
+            let uncovered = &mut uncovered[..count];
+            self.draw_moments(level, edge_hull, &members, None, pass, strips, uncovered);
+            for (index, (moment, uncovered)) in covered.iter_mut().zip(uncovered).enumerate() {
+                let hiding = hiding[index * hiding.len() / count];
+                moment.mix_partly(uncovered, |x, y| hiding.coverage(x, y));
+            }
+        }
+        mean.reset(rect, self.layer_count(), &[]);
+        for moment in &moments[..count] {
+            mean.add_share(level, moment, 1.0 / count as f32);
+        }
+    }
+
+    /// Draws the slices within `rect` at each moment, into an accumulator for each. Opaque surfaces hide what is behind them in equal parts of the exposure, or
+    /// are left out.
+    #[allow(clippy::too_many_arguments)]
+    fn draw_moments(
+        &self,
+        level: Level,
+        rect: Rect,
+        members: &CellMembers,
+        hiding: Option<&[&HidingDepth]>,
+        pass: Pass,
+        strips: &mut [Strip; 3],
+        accumulators: &mut [Accumulator],
+    ) {
+        let count = members.count;
+        let [strip, uncovered, covered] = strips;
+        accumulators.iter_mut().for_each(|accumulator| accumulator.reset(rect, self.layer_count(), &[]));
+        for slice in self.slices {
+            for &member in &slice.members {
+                let whole = self.prepared[member].as_ref();
+                if pass.leaves_out(whole, member, hiding.is_some()) {
+                    continue;
+                }
+                let parts = &members.parts[member];
+                let hiding = hiding.filter(|_| !pass.hiding.is_opaque(member));
+                let hiding_parts = hiding.map_or(1, |hiding| hiding.len());
+                // What has no parts, such as gas and rain, takes long to draw: once behind the smeared surfaces, which are as far away as those of each moment,
+                // and once without them.
+                let selects = parts.len() == 1 && hiding_parts > 1;
+                if selects {
+                    let touched = whole.bounds(&slice.interval).intersection(&rect);
+                    if touched.is_empty() {
+                        continue;
+                    }
+                    for (with_opaque, strip) in [(false, &mut *uncovered), (true, &mut *covered)] {
+                        let depth = pass.hiding.depth_for(member, with_opaque, pass.plate_depth);
+                        self.draw_member(member, whole, &slice.interval, touched, depth, 0, strip);
+                    }
+                }
+                // Both numbers are halves, quarters or eighths of the same one.
+                let pieces = parts.len().max(hiding_parts);
+                for piece in 0..pieces {
+                    let hiding = hiding.map(|hiding| hiding[piece * hiding_parts / pieces]);
+                    if selects {
+                        strip.select(uncovered, covered, |x, y| hiding.is_some_and(|it| it.coverage(x, y) > 0.0));
+                    } else {
+                        let prepared = parts[piece * parts.len() / pieces];
+                        let touched = prepared.bounds(&slice.interval).intersection(&rect);
+                        if touched.is_empty() {
+                            continue;
+                        }
+                        let hiding_or_plate = hiding.unwrap_or(pass.hiding);
+                        let depth = hiding_or_plate.depth_for(member, hiding.is_some(), pass.plate_depth);
+                        self.draw_member(member, prepared, &slice.interval, touched, depth, 0, strip);
+                    }
+                    for accumulator in &mut accumulators[moments_of(piece, pieces, count)] {
+                        accumulator.add_behind(level, strip, member, &[]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rect(x: usize, y: usize, width: usize, height: usize) -> Rect {
+        Rect { x, y, width, height }
+    }
+
+    #[test]
+    fn cells_are_where_two_members_move() {
+        let strip = rect(0, 8, 100, 8);
+        assert_eq!(cells(&[rect(0, 0, 100, 100)], strip), [], "one moves");
+        assert_eq!(cells(&[rect(0, 0, 50, 50), rect(50, 0, 50, 50), rect(0, 20, 100, 9)], strip), [], "side by side");
+        let cell = |rect, moving: &[usize]| Cell { rect, moving: moving.to_vec() };
+        assert_eq!(
+            cells(&[rect(0, 0, 100, 100), rect(10, 12, 20, 40), rect(20, 10, 80, 2)], strip),
+            [
+                cell(rect(0, 8, 100, 2), &[]),
+                cell(rect(0, 10, 20, 2), &[]),
+                cell(rect(20, 10, 80, 2), &[0, 2]),
+                cell(rect(0, 12, 10, 4), &[]),
+                cell(rect(10, 12, 20, 4), &[0, 1]),
+                cell(rect(30, 12, 70, 4), &[]),
+            ]
+        );
+    }
+
+    #[test]
+    fn cells_cover_a_strip_once_and_tiles_are_aligned_to_the_picture() {
+        let strip = rect(30, 8, 500, 8);
+        let moving = [rect(0, 0, 1000, 100), rect(40, 10, 300, 100), rect(200, 0, 400, 13)];
+        let cells = cells(&moving, strip);
+        for y in strip.y..strip.bottom() {
+            for x in strip.x..strip.right() {
+                let pixel = rect(x, y, 1, 1);
+                let mut here = cells.iter().filter(|cell| !cell.rect.intersection(&pixel).is_empty());
+                let cell = here.next().unwrap();
+                assert!(here.next().is_none());
+                let inside: Vec<usize> = (0..3).filter(|&i| !moving[i].intersection(&pixel).is_empty()).collect();
+                assert_eq!(cell.moving, if inside.len() < 2 { Vec::new() } else { inside });
+            }
+        }
+        let aligned = |cell: &Cell| cell.rect.x / TILE_COLUMNS == (cell.rect.right() - 1) / TILE_COLUMNS;
+        assert!(cells.iter().filter(|cell| cell.is_drawn_by_moments()).all(aligned));
+    }
+
+    #[test]
+    fn moments_of_a_piece_are_its_share_of_the_exposure() {
+        assert_eq!(moments_of(2, 8, 32), 8..12);
+        assert_eq!(moments_of(0, 1, 24), 0..24);
+    }
+}
