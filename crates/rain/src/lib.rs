@@ -62,6 +62,7 @@ mod parameters;
 mod phenomenon;
 mod raindrop;
 pub(crate) mod render;
+mod run;
 pub(crate) mod shutter_cameras;
 pub mod streaks;
 pub mod textured_billboards;
@@ -69,6 +70,7 @@ pub mod textured_billboards;
 pub use model::Rain;
 pub use parameters::{Method, RainParameters, SplashParameters};
 pub use raindrop::Raindrop;
+pub use run::RainRun;
 
 #[cfg(test)]
 mod tests;

@@ -12,8 +12,9 @@ use fearless_simd::dispatch;
 use crate::{
     Rain,
     drops::{
+        classes::DropClassState,
         lattice::{CELL_SIZE, LatticeCell},
-        shutter_state::{DropClassState, ShutterState},
+        shutter_state::ShutterState,
     },
     streaks::{
         cell_drops::{CellDrops, DropBatch},
@@ -98,7 +99,7 @@ impl Rain {
     /// ```
     #[must_use]
     pub fn drops(&self, view: &View, surroundings: &Surroundings) -> Vec<Raindrop> {
-        let shutter_state = ShutterState::new(self, view, surroundings);
+        let shutter_state = self.shutter_state(view, surroundings);
         let bounds = shutter_state.around_camera(1.1 * shutter_state.distance);
         let level = bansho_base::math::simd::level();
         let chunks = map_cell_chunks(&shutter_state, &[bounds], 0.5 * CELL_SIZE, |cells| {
