@@ -57,7 +57,6 @@ pub mod drops;
 pub(crate) mod lanes;
 pub mod lighting;
 mod model;
-pub mod opacity_law;
 mod parameters;
 mod phenomenon;
 mod raindrop;
@@ -68,7 +67,7 @@ pub mod streaks;
 pub mod textured_billboards;
 
 pub use model::Rain;
-pub use parameters::{Method, RainParameters, SplashParameters};
+pub use parameters::{Method, OpacityLaw, RainParameters, SplashParameters, VelocityLaw};
 pub use raindrop::Raindrop;
 pub use run::RainRun;
 

@@ -44,7 +44,7 @@ pub struct Raindrop {
     pub weight: f64,
     /// Fraction of the exposure before the drop lands, 0 to 1.
     pub exposed_fraction: f64,
-    /// Factor of the opacity: `opacity_gain` times that of the law of opacity ([`OpacityLaw::factor`](crate::opacity_law::OpacityLaw::factor)). 1 by
+    /// Factor of the opacity: `opacity_gain` times that of the law of opacity ([`OpacityLaw::factor`](crate::OpacityLaw::factor)). 1 by
     /// default.
     pub opacity_factor: f64,
     /// Opacity on the axis of its streak, away from its ends, seen from the side by a camera at rest: the fraction `2 r / (v T)` of the exposure during which

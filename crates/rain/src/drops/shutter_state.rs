@@ -17,8 +17,7 @@ use super::{
 };
 use crate::{
     lanes::smoothstep,
-    opacity_law::OpacityLaw,
-    parameters::RainParameters,
+    parameters::{OpacityLaw, RainParameters},
     shutter_cameras::{MAX_DROP_RADIUS, ShutterCameras},
 };
 
