@@ -5,6 +5,7 @@
 
 use std::{
     hint::black_box,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -22,7 +23,7 @@ use bansho_base::{
     world::wind::{Wind, WindParameters},
 };
 
-use bansho_aurora::{Aurora, AuroraParameters, ParticleParameters, RenderingParameters, Sampling};
+use bansho_aurora::{Aurora, AuroraParameters, AuroraRun, ParticleParameters, RenderingParameters, Sampling};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 const STRIP_ROWS: usize = 8;
@@ -32,14 +33,15 @@ const SPLATTED: usize = 10;
 const REACH: i64 = 3;
 const SIGMA: f64 = 1.2;
 
-fn aurora(sampling: Sampling) -> Aurora {
+fn run(sampling: Sampling) -> AuroraRun {
     let parameters = AuroraParameters {
         energy_ev: Animated::from(10_000.0),
         particles: ParticleParameters { count: 120_000, ..ParticleParameters::default() },
         rendering: RenderingParameters { sampling, ..RenderingParameters::default() },
         ..AuroraParameters::default()
     };
-    Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).expect("the usual shapes are an aurora's")
+    let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default());
+    AuroraRun::new(Arc::new(aurora.expect("the usual shapes are an aurora's")))
 }
 
 fn view(lens: Lens, target: [f64; 3], size: [usize; 2]) -> View {
@@ -54,11 +56,11 @@ fn view(lens: Lens, target: [f64; 3], size: [usize; 2]) -> View {
 }
 
 /// The whole frame, strip by strip.
-fn frame(aurora: &Aurora, view: &View) -> f32 {
+fn frame(run: &AuroraRun, view: &View) -> f32 {
     use rayon::prelude::*;
     let wind = Wind::new(WindParameters::default(), 1, None);
     let surroundings = Surroundings::from_wind(&wind);
-    let prepared = aurora.prepare(view, &surroundings, &Unobserved).expect("nobody asks to stop");
+    let prepared = run.prepare(view, &surroundings, &Unobserved).expect("nobody asks to stop");
     let strips = (0..view.size[1]).into_par_iter().step_by(STRIP_ROWS);
     let sums = strips.map_init(Strip::default, |strip, y| {
         let height = STRIP_ROWS.min(view.size[1] - y);
@@ -70,8 +72,8 @@ fn frame(aurora: &Aurora, view: &View) -> f32 {
 }
 
 /// A Gaussian per point for one particle of [`SPLATTED`], one after the other.
-fn splat(aurora: &Aurora, view: &View) -> f32 {
-    let particles = aurora.simulation().particles();
+fn splat(run: &AuroraRun, view: &View) -> f32 {
+    let particles = run.simulation().particles();
     let [width, height] = view.size.map(|side| side as i64);
     let mut picture = vec![[0.0_f32; 3]; (width * height) as usize];
     for index in (0..particles.len()).step_by(SPLATTED) {
@@ -97,11 +99,11 @@ fn splat(aurora: &Aurora, view: &View) -> f32 {
 
 fn draw(criterion: &mut Criterion) {
     let north = view(Lens::Perspective, [0.0, 25.0, -60.0], [1280, 720]);
-    let mean = aurora(Sampling::MeanProfile);
+    let mean = run(Sampling::MeanProfile);
     let mut group = criterion.benchmark_group("aurora 1280x720, 120,000 particles");
     group.sample_size(10).measurement_time(Duration::from_secs(3));
     group.bench_function("profile", |bencher| bencher.iter(|| frame(black_box(&mean), &north)));
-    let single = aurora(Sampling::SingleCollisions);
+    let single = run(Sampling::SingleCollisions);
     group.bench_function("collisions", |bencher| bencher.iter(|| frame(black_box(&single), &north)));
     group.bench_function("naive: a Gaussian for each point", |bencher| {
         bencher.iter_custom(|iterations| {

@@ -65,6 +65,7 @@ mod parameters;
 mod phenomenon;
 pub mod physics;
 pub mod render;
+mod run;
 pub mod shapes;
 pub mod simulate;
 
@@ -75,3 +76,4 @@ pub use parameters::{
     SpectrumShape,
 };
 pub use render::{Blur, BlurParameters, RenderingParameters, Sampling, TrackModel};
+pub use run::AuroraRun;

@@ -3,13 +3,9 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    geometry::point_cloud::PointCloud,
-    host::observer::{Cancelled, Observer},
     parameters::BuildError,
     phenomenon::{
-        Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SharedMemory, SnapshotError, Stepped, Stepping,
-        strip::{DepthInterval, Shutter, View},
-        surroundings::{OtherPhenomena, Publication, Surroundings},
+        Phenomenon, PhenomenonInfo, Remark, Run, SharedMemory, Stepping, strip::View, surroundings::OtherPhenomena,
     },
     tables::{BuildContext, PhenomenonTable, TableKind},
 };
@@ -17,17 +13,10 @@ use bansho_base::{
 use super::{
     AuroraParameters, AuroraStage,
     model::{Aurora, OBLIQUE_LUMINANCE_FACTOR},
-    render::aovs::AOVS,
+    render::{aovs::AOVS, stages::WHITE_LUMINANCE},
+    run::AuroraRun,
     shapes::ShapeErrorKind,
     simulate::AuroraSimulation,
-};
-use crate::{
-    render::{
-        prepared::{DEPTHS, PreparedAurora},
-        shutter,
-        stages::{self, PreparedStage, WHITE_LUMINANCE},
-    },
-    simulate::point_cloud::point_cloud,
 };
 
 impl AuroraParameters {
@@ -108,72 +97,6 @@ impl Phenomenon for Aurora {
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {
-        // A run copies the shared initial state when it is first stepped or drawn: remarks start hundreds of runs that never are.
-        Box::new((*self).clone())
-    }
-}
-
-impl Run for Aurora {
-    fn publish(&self, _shutter: Shutter) -> Publication {
-        if self.parameters.stage != AuroraStage::Light {
-            return Publication::default();
-        }
-        Publication { lights: self.directional_light().into_iter().collect(), ..Publication::default() }
-    }
-
-    fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        vec![if self.parameters.stage == AuroraStage::Light { DEPTHS } else { stages::DEPTHS }]
-    }
-
-    fn prepare<'a>(
-        &'a self,
-        view: &'a View,
-        _surroundings: &'a Surroundings<'a>,
-        observer: &dyn Observer,
-    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-        match self.parameters.stage {
-            AuroraStage::Light => Ok(Box::new(PreparedAurora::new(self, view, observer)?)),
-            stage => Ok(Box::new(PreparedStage::new(self, stage, view))),
-        }
-    }
-
-    fn export(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
-        let t = view.shutter.middle();
-        let step = AuroraSimulation::STEP_S;
-        if t - self.simulation().time() <= step {
-            return Some(point_cloud(self.simulation().particles(), t - self.simulation().time(), view.export_origin));
-        }
-        // Within a long exposure, `t` may be many steps after the state.
-        let mut simulation = self.simulation().clone();
-        shutter::step_until(&mut simulation, t);
-        Some(point_cloud(simulation.particles(), t - simulation.time(), view.export_origin))
-    }
-
-    fn as_stepped(&self) -> Option<&dyn Stepped> {
-        Some(self)
-    }
-
-    fn as_stepped_mut(&mut self) -> Option<&mut dyn Stepped> {
-        Some(self)
-    }
-}
-
-impl Stepped for Aurora {
-    fn step(&mut self, _time: f64, _surroundings: &Surroundings) {
-        if let Some(simulation) = self.simulation_mut() {
-            simulation.step();
-        }
-    }
-
-    fn time_for(&self, shutter: Shutter) -> f64 {
-        if shutter::is_long(shutter) { shutter.open } else { shutter.middle() }
-    }
-
-    fn snapshot(&self) -> Vec<u8> {
-        self.simulation().snapshot()
-    }
-
-    fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
-        self.simulation_mut().map_or(Err(SnapshotError::NoState), |simulation| simulation.restore(state))
+        Box::new(AuroraRun::new(self))
     }
 }

@@ -1,5 +1,5 @@
 //! Modules beside each other do not use each other in a circle: in every crate, for every module, its children are in an order in which each
-//! uses only those before it. Parent and child may use each other.
+//! uses only those before it. Parent and child may use each other. What is used counts as of the module that defines it, not of those that re-export it.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -21,6 +21,8 @@ type Uses = BTreeMap<Module, BTreeSet<Module>>;
 /// The modules of a crate with the source of each, without those that are compiled for tests only.
 struct Crate {
     modules: BTreeMap<Module, syn::File>,
+    /// For each module, the names that its `use` items bring into it, with the paths that they stand for.
+    imports: BTreeMap<Module, BTreeMap<String, Vec<String>>>,
 }
 
 impl Crate {
@@ -29,7 +31,12 @@ impl Crate {
         for root in ["lib.rs", "main.rs"].map(|name| source.join(name)).iter().filter(|root| root.exists()) {
             Self::read_module(root, source, &Module::new(), &mut modules);
         }
-        Self { modules }
+        Self::new(modules)
+    }
+
+    fn new(modules: BTreeMap<Module, syn::File>) -> Self {
+        let imports = modules.iter().map(|(module, file)| (module.clone(), imports_of(file))).collect();
+        Self { modules, imports }
     }
 
     /// Reads the file of a module, then its children from `folder`.
@@ -52,11 +59,76 @@ impl Crate {
     fn uses(&self) -> Uses {
         let mut uses = Uses::new();
         for (module, file) in &self.modules {
-            let mut paths = Paths { crate_modules: &self.modules, module, named: BTreeSet::new() };
+            let mut paths = Paths { code: self, module, named: BTreeSet::new() };
             paths.visit_file(file);
             uses.insert(module.clone(), paths.named);
         }
         uses
+    }
+
+    /// The deepest module that `path` leads to from `module`, where it begins with `crate`, `self`, `super` or a child of the module: the one that defines
+    /// what it names. Names that a module imports are followed to where they come from, through at most `imports_left` imports.
+    fn definition(&self, module: &Module, path: &[String], imports_left: usize) -> Option<Module> {
+        let first = path.first()?;
+        let mut target = match first.as_str() {
+            "crate" => Module::new(),
+            "self" | "super" => module.clone(),
+            _ if self.modules.contains_key(&[&module[..], &path[..1]].concat()) => module.clone(),
+            _ => return None,
+        };
+        for (index, name) in path.iter().enumerate() {
+            match name.as_str() {
+                "crate" | "self" => {}
+                "super" => {
+                    target.pop();
+                }
+                _ => {
+                    let next = [&target[..], std::slice::from_ref(name)].concat();
+                    if self.modules.contains_key(&next) {
+                        target = next;
+                        continue;
+                    }
+                    let import = self.imports.get(&target).and_then(|imports| imports.get(name));
+                    let Some(import) = import.filter(|_| imports_left > 0) else { break };
+                    let path = [&import[..], &path[index + 1..]].concat();
+                    // What another crate defines is of none of these modules.
+                    return Some(self.definition(&target, &path, imports_left - 1).unwrap_or(target));
+                }
+            }
+        }
+        Some(target)
+    }
+}
+
+/// The names that the `use` items of a file bring into its module, with the paths that they stand for.
+fn imports_of(file: &syn::File) -> BTreeMap<String, Vec<String>> {
+    let mut imports = BTreeMap::new();
+    for item in &file.items {
+        if let Item::Use(item) = item
+            && !is_for_tests(&item.attrs)
+        {
+            collect_imports(&[], &item.tree, &mut imports);
+        }
+    }
+    imports
+}
+
+fn collect_imports(before: &[String], tree: &UseTree, imports: &mut BTreeMap<String, Vec<String>>) {
+    match tree {
+        UseTree::Path(path) => {
+            collect_imports(&[before, &[path.ident.to_string()]].concat(), &path.tree, imports);
+        }
+        UseTree::Name(name) if name.ident == "self" => {
+            imports.extend(before.last().map(|last| (last.clone(), before.to_vec())));
+        }
+        UseTree::Name(name) => {
+            imports.insert(name.ident.to_string(), [before, &[name.ident.to_string()]].concat());
+        }
+        UseTree::Rename(rename) => {
+            imports.insert(rename.rename.to_string(), [before, &[rename.ident.to_string()]].concat());
+        }
+        UseTree::Glob(_) => {}
+        UseTree::Group(group) => group.items.iter().for_each(|tree| collect_imports(before, tree, imports)),
     }
 }
 
@@ -68,40 +140,20 @@ fn is_for_tests(attributes: &[Attribute]) -> bool {
     attributes.iter().any(is_test)
 }
 
+/// Longest chain of re-exports that is followed.
+const MAX_IMPORTS: usize = 8;
+
 /// Collects the modules of the own crate that the paths of one module lead to.
 struct Paths<'a> {
-    crate_modules: &'a BTreeMap<Module, syn::File>,
+    code: &'a Crate,
     module: &'a Module,
     named: BTreeSet<Module>,
 }
 
 impl Paths<'_> {
-    /// Notes the deepest module that `path` leads to, where it begins with `crate`, `self`, `super` or a child of the module.
+    /// Notes the module that defines what `path` names.
     fn note(&mut self, path: &[String]) {
-        let Some(first) = path.first() else { return };
-        let child = [&self.module[..], &path[..1]].concat();
-        let mut target = match first.as_str() {
-            "crate" => Module::new(),
-            "self" | "super" => self.module.clone(),
-            _ if self.crate_modules.contains_key(&child) => child,
-            _ => return,
-        };
-        for name in path {
-            match name.as_str() {
-                "crate" | "self" => {}
-                "super" => {
-                    target.pop();
-                }
-                _ => {
-                    let next = [&target[..], std::slice::from_ref(name)].concat();
-                    if !self.crate_modules.contains_key(&next) {
-                        break;
-                    }
-                    target = next;
-                }
-            }
-        }
-        self.named.insert(target);
+        self.named.extend(self.code.definition(self.module, path, MAX_IMPORTS));
     }
 
     fn note_use(&mut self, before: &[String], tree: &UseTree) {
@@ -221,12 +273,36 @@ fn a_circle_is_found() {
         ("physics", "pub mod air;"),
         ("physics::air", "fn shown() -> u8 { super::super::draw::code(crate::SIZE) }"),
     ];
-    let parsed = |modules: &[(&str, &str)]| Crate {
-        modules: modules.iter().map(|(path, text)| (module(path), file(text))).collect(),
-    };
+    let parsed =
+        |modules: &[(&str, &str)]| Crate::new(modules.iter().map(|(path, text)| (module(path), file(text))).collect());
     let expected = ["any\n    draw uses physics\n    physics uses draw".to_owned()];
     assert_eq!(cycles("any", &parsed(&modules).uses()), expected);
     let mut broken = modules;
     broken[3].1 = "#[cfg(test)] mod tests { use crate::draw::code; } #[cfg(test)] fn shown() { crate::draw::code(0); }";
+    assert_eq!(cycles("any", &parsed(&broken).uses()), Vec::<String>::new());
+}
+
+#[test]
+fn a_circle_through_re_exports_is_found() {
+    let modules = [
+        ("", "mod draw; mod model; pub use model::{Flame, shape as form};"),
+        ("model", "pub use self::state::Flame; use crate::draw::code; pub(crate) mod shape; mod state;"),
+        ("model::state", "pub struct Flame;"),
+        ("model::shape", ""),
+        ("draw", "use crate::Flame; pub fn code() {}"),
+    ];
+    let module = |path: &str| path.split("::").filter(|name| !name.is_empty()).map(str::to_owned).collect::<Module>();
+    let parsed = |modules: &[(&str, &str)]| {
+        Crate::new(modules.iter().map(|(path, text)| (module(path), syn::parse_file(text).unwrap())).collect())
+    };
+    let code = parsed(&modules);
+    let path = |text: &str| text.split("::").map(str::to_owned).collect::<Vec<String>>();
+    let definition = |text: &str| code.definition(&module("draw"), &path(text), MAX_IMPORTS);
+    assert_eq!(definition("crate::Flame"), Some(module("model::state")));
+    assert_eq!(definition("crate::form::area"), Some(module("model::shape")));
+    assert_eq!(definition("super::Absent"), Some(module("")));
+    assert_eq!(cycles("any", &code.uses()), ["any\n    draw uses model\n    model uses draw"]);
+    let mut broken = modules;
+    broken[4].1 = "#[cfg(test)] use crate::Flame; pub fn code() {}";
     assert_eq!(cycles("any", &parsed(&broken).uses()), Vec::<String>::new());
 }

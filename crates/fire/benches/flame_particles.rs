@@ -3,7 +3,7 @@
 
 mod support;
 
-use std::hint::black_box;
+use std::{hint::black_box, sync::Arc};
 
 use bansho_base::{
     host::assets::MemoryAssets,
@@ -15,7 +15,7 @@ use bansho_base::{
     },
 };
 
-use bansho_fire::particles::{FlameParticles, FlameParticlesParameters};
+use bansho_fire::particles::{FlameParticles, FlameParticlesParameters, FlameParticlesRun};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use support::pinned_pool;
 
@@ -30,16 +30,17 @@ fn step(criterion: &mut Criterion) {
     for count in [3_000, 30_000, 100_000] {
         let parameters = FlameParticlesParameters { particles: count, preroll_s: Auto::Set(0.5), ..Default::default() };
         let step_s = parameters.step_s;
-        let Ok(mut flame) = FlameParticles::new(parameters, "flame", 1, None, &MemoryAssets::default()) else { return };
-        (-60..0).for_each(|step| flame.step(f64::from(step) * step_s, &around));
+        let Ok(flame) = FlameParticles::new(parameters, "flame", 1, None, &MemoryAssets::default()) else { return };
+        let mut run = FlameParticlesRun::new(Arc::new(flame));
+        (-60..0).for_each(|step| run.step(f64::from(step) * step_s, &around));
         let id = format!("{count}");
         group.bench_function(id, |bencher| {
             pool.install(|| {
                 bencher.iter_batched_ref(
-                    || flame.clone(),
-                    |flame| {
-                        flame.step(0.0, &around);
-                        black_box(flame.particles().len())
+                    || run.clone(),
+                    |run| {
+                        run.step(0.0, &around);
+                        black_box(run.particles().len())
                     },
                     BatchSize::LargeInput,
                 );

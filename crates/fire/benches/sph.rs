@@ -5,16 +5,16 @@
 
 mod support;
 
-use std::{collections::HashMap, hint::black_box};
+use std::{collections::HashMap, hint::black_box, sync::Arc};
 
 use bansho_base::{
     host::assets::MemoryAssets,
     math::random::{Key, Purpose},
-    phenomenon::{Phenomenon, Stepped, surroundings::Surroundings},
+    phenomenon::{Phenomenon, Stepped, Stepping, surroundings::Surroundings},
     world::wind::{Wind, WindParameters},
 };
 
-use bansho_fire::particles::{FlameParticles, FlameParticlesParameters};
+use bansho_fire::particles::{FlameParticles, FlameParticlesParameters, FlameParticlesRun};
 use bansho_sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, compute_densities};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use support::pinned_pool;
@@ -144,7 +144,8 @@ fn unsorted_step(particles: &mut Particles<3>) {
 
 /// A flame of a step that is not divided, which has burned long enough to be whole.
 struct DetailFactors {
-    flame: FlameParticles,
+    run: FlameParticlesRun,
+    stepping: Stepping,
     wind: Wind,
     steps: u64,
 }
@@ -155,15 +156,14 @@ impl DetailFactors {
         parameters.fluid.max_substeps = 1;
         let flame = FlameParticles::new(parameters, "bench", 1, None, &MemoryAssets::default()).ok()?;
         let wind = Wind::new(WindParameters { velocity: [0.5, 0.0, 0.0].into(), ..Default::default() }, 1, None);
-        let mut burning = Self { flame, wind, steps: 0 };
-        let preroll = burning.flame.info().stepping?.preroll_steps();
-        (0..preroll).for_each(|_| burning.step());
+        let stepping = flame.info().stepping?;
+        let mut burning = Self { run: FlameParticlesRun::new(Arc::new(flame)), stepping, wind, steps: 0 };
+        (0..stepping.preroll_steps()).for_each(|_| burning.step());
         Some(burning)
     }
 
     fn step(&mut self) {
-        let Some(stepping) = self.flame.info().stepping else { return };
-        self.flame.step(stepping.time_after(self.steps), &Surroundings::from_wind(&self.wind));
+        self.run.step(self.stepping.time_after(self.steps), &Surroundings::from_wind(&self.wind));
         self.steps += 1;
     }
 }

@@ -1,7 +1,7 @@
 //! A frame of rain by billboards and drop by drop, each compared with the naive algorithm: every drop is projected, and its bounding box
 //! is filled pixel by pixel by the distance from its axis.
 
-use std::hint::black_box;
+use std::{hint::black_box, sync::Arc};
 
 use bansho_base::{
     camera::CameraParameters,
@@ -20,7 +20,7 @@ use bansho_base::{
     world::wind::{Wind, WindParameters},
 };
 
-use bansho_rain::{Method, Rain, RainParameters};
+use bansho_rain::{Method, Rain, RainParameters, RainRun};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 const SIZE: [usize; 2] = [1280, 720];
@@ -41,10 +41,10 @@ fn wide() -> RainParameters {
     RainParameters { rate_mm_per_h: 100.0.into(), distance: 20.0, airlight_distance: 0.0, ..RainParameters::default() }
 }
 
-fn rain(method: Method, rate: f64, distance: f64, airlight_distance: f64) -> Rain {
+fn rain(method: Method, rate: f64, distance: f64, airlight_distance: f64) -> RainRun {
     let parameters =
         RainParameters { rate_mm_per_h: rate.into(), method, distance, airlight_distance, ..RainParameters::default() };
-    Rain::new(parameters, "bench", 1, None).expect("the parameters go together")
+    RainRun::new(Arc::new(Rain::new(parameters, "bench", 1, None).expect("the parameters go together")))
 }
 
 fn surroundings(wind: &Wind) -> Surroundings<'_> {
@@ -59,7 +59,7 @@ fn surroundings(wind: &Wind) -> Surroundings<'_> {
 }
 
 /// Prepares and draws one frame with the threads of the pool.
-fn draw_frame(rain: &Rain, view: &View, surroundings: &Surroundings) {
+fn draw_frame(rain: &RainRun, view: &View, surroundings: &Surroundings) {
     let Ok(prepared) = rain.prepare(view, surroundings, &Unobserved) else { return };
     use rayon::prelude::*;
     (0..SIZE[1] / STRIP).into_par_iter().for_each_init(Strip::default, |strip, index| {
@@ -139,7 +139,7 @@ fn frames(criterion: &mut Criterion) {
     group.sample_size(10);
     for (name, simplification_codes) in [("billboards, 100 mm/h to 20 m", 1.5), ("naive: every drop of them", 0.0)] {
         let parameters = RainParameters { simplification_codes, ..wide() };
-        let rain = Rain::new(parameters, "bench", 1, None).expect("the parameters go together");
+        let rain = RainRun::new(Arc::new(Rain::new(parameters, "bench", 1, None).expect("the parameters go together")));
         let view = View { white_luminance: Some(40.0), ..view.clone() };
         group.bench_function(name, |bencher| {
             bencher.iter(|| pool.install(|| draw_frame(&rain, &view, &surroundings)));

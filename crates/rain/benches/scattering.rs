@@ -1,7 +1,7 @@
 //! The light of fires that rain scatters toward the camera, when the fires have changed since the last frame; compared with the naive algorithm: one line of
 //! sight, one light and one sample at a time, in double precision, at the same corners of the same grids.
 
-use std::hint::black_box;
+use std::{hint::black_box, sync::Arc};
 
 use bansho_base::{
     camera::CameraParameters,
@@ -15,7 +15,7 @@ use bansho_base::{
     },
     world::wind::{Wind, WindParameters},
 };
-use bansho_rain::{Rain, RainParameters, lighting::drop_phase_function::DropPhaseFunction};
+use bansho_rain::{Rain, RainParameters, RainRun, lighting::drop_phase_function::DropPhaseFunction};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 const SIZE: [usize; 2] = [1280, 720];
@@ -109,7 +109,7 @@ fn scattering(criterion: &mut Criterion) {
     // Hardly any streaks.
     let mut parameters = RainParameters { rate_mm_per_h: 1.0.into(), distance: 1.0, ..RainParameters::default() };
     parameters.splashes.fraction = 0.0;
-    let rain = Rain::new(parameters, "bench", 1, None).expect("the parameters go together");
+    let rain = RainRun::new(Arc::new(Rain::new(parameters, "bench", 1, None).expect("the parameters go together")));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let mut group = criterion.benchmark_group("light of fires in rain 1280x720, 1 thread");
     group.sample_size(10);

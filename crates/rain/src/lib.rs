@@ -57,18 +57,19 @@ pub mod drops;
 pub(crate) mod lanes;
 pub mod lighting;
 mod model;
-pub mod opacity_law;
 mod parameters;
 mod phenomenon;
 mod raindrop;
 pub(crate) mod render;
+mod run;
 pub(crate) mod shutter_cameras;
 pub mod streaks;
 pub mod textured_billboards;
 
 pub use model::Rain;
-pub use parameters::{Method, RainParameters, SplashParameters};
+pub use parameters::{Method, OpacityLaw, RainParameters, SplashParameters, VelocityLaw};
 pub use raindrop::Raindrop;
+pub use run::RainRun;
 
 #[cfg(test)]
 mod tests;

@@ -1,29 +1,26 @@
 //! Rain: the constants that are computed once from its parameters.
 
-use std::{ops::RangeInclusive, sync::LazyLock};
+use std::sync::LazyLock;
 
 use bansho_base::{
     host::constructions,
     math::random::Key,
     parameters::{ParameterError, ParameterErrorKind},
-    phenomenon::surroundings::Surroundings,
+    phenomenon::{strip::View, surroundings::Surroundings},
 };
 
 use super::parameters::{Method, RainParameters};
 use crate::{
     billboards::texture::{StreakQuantity, StreakTextureError},
     drops::{
-        lattice::{Lattice, LatticeMotion},
-        shutter_state::{DropClassState, ground_height},
-        size_distribution::{DropSizeDistribution, SizeBin},
-        terminal_velocity::{FallAir, TerminalVelocity},
+        classes::DropClasses,
+        shutter_state::{ShutterState, ground_height},
+        size_distribution::DropSizeDistribution,
     },
     lighting::{
         drop_lighting::ScatteringTable,
         drop_phase_function::DropPhaseFunction,
         extinction::{ExtinctionEfficiency, RainExtinction, extinction},
-        in_scattering::LampScatteringCache,
-        sky::SkyLightingCache,
     },
     textured_billboards::TextureSet,
 };
@@ -31,20 +28,16 @@ use crate::{
 /// Extent of the rain over ground that extends to the horizon, m.
 pub(super) const HORIZON: f64 = 2e4;
 
-/// Rain, ready to be drawn at any time.
+/// Rain of a scene: its parameters and what follows from them, for any time. It does not change; a run of it is a [`RainRun`](crate::RainRun).
 #[derive(Debug)]
 pub struct Rain {
     pub(super) name: String,
     pub(super) parameters: RainParameters,
     pub(super) key: Key,
     pub(super) optics: &'static Optics,
-    pub(super) skies: SkyLightingCache,
-    /// Scattered light of lamps that was computed already.
-    pub(super) lamp_scattering: LampScatteringCache,
-    pub(super) classes: Vec<DropClass>,
+    pub(super) classes: DropClasses,
     /// With `method = "textures"`: those of all rates and diameters.
     pub(super) textures: Option<TextureSet>,
-    pub(super) loop_s: Option<f64>,
 }
 
 /// Scattering of light by drops, the same for all rain.
@@ -69,14 +62,6 @@ fn texture_error(error: &StreakTextureError) -> ParameterError {
     ParameterError { key, kind: ParameterErrorKind::NotWith { allowed, other: "`method = \"textures\"`" } }
 }
 
-/// A bin of drop sizes, represented by one diameter.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct DropClass {
-    pub(super) bin: SizeBin,
-    /// Maximum number of drops per cubic meter in the shot.
-    pub(super) max_density: f64,
-}
-
 impl Rain {
     /// The rain `name` of a scene; in a seamless loop it repeats every `loop_s` seconds.
     ///
@@ -99,19 +84,12 @@ impl Rain {
         constructions::count("rain");
         let textures = (parameters.method == Method::Textures).then(|| TextureSet::new(&parameters, seed));
         let textures = textures.transpose().map_err(|error| texture_error(&error))?;
-        let [_, max_rate] = parameters.rate_mm_per_h.bounds();
-        let sizes = DropSizeDistribution::marshall_palmer(max_rate);
-        let class = |bin: SizeBin| DropClass { bin, max_density: bin.count(&sizes) };
-        let classes = SizeBin::around(&parameters.diameters_mm).into_iter().map(class).collect();
         Ok(Self {
             name: name.to_owned(),
             key: Key::new(seed, name),
             optics: &OPTICS,
-            skies: SkyLightingCache::default(),
-            lamp_scattering: LampScatteringCache::default(),
-            classes,
+            classes: DropClasses::new(&parameters, loop_s),
             textures,
-            loop_s,
             parameters,
         })
     }
@@ -123,33 +101,12 @@ impl Rain {
 
     /// Rain rate R at time `t`, mm/h; periodic in a loop.
     pub(super) fn rate(&self, t: f64) -> f64 {
-        self.parameters.rate_mm_per_h.at(self.loop_s.map_or(t, |seconds| t.rem_euclid(seconds)))
+        self.classes.rate(&self.parameters, t)
     }
 
-    /// The drops of each diameter at time `t` between two `heights` (m) over the `ground`, as they fall in the wind and the air of the scene.
-    pub(super) fn classes(
-        &self,
-        t: f64,
-        surroundings: &Surroundings,
-        ground: f64,
-        heights: RangeInclusive<f64>,
-    ) -> Vec<DropClassState> {
-        let sizes = DropSizeDistribution::marshall_palmer(self.rate(t));
-        let air = FallAir::at(surroundings.air.temperature_k, surroundings.air.pressure_pa);
-        let velocity = TerminalVelocity { law: self.parameters.terminal_velocity, air };
-        let (wind, response, loop_s) = (surroundings.wind, self.parameters.wind_response, self.loop_s);
-        let state = |(index, class): (usize, &DropClass)| {
-            let speed = velocity.speed(class.bin.diameter_mm);
-            DropClassState {
-                index,
-                diameter_mm: class.bin.diameter_mm,
-                speed,
-                max_density: class.max_density,
-                fraction: if class.max_density > 0.0 { class.bin.count(&sizes) / class.max_density } else { 0.0 },
-                lattice: Lattice::new(&LatticeMotion { speed, wind, response, ground, loop_s }, heights.clone(), t),
-            }
-        };
-        self.classes.iter().enumerate().map(state).collect()
+    /// The drops during the exposure of a view, as they fall in the wind and the air of the scene.
+    pub(super) fn shutter_state(&self, view: &View, surroundings: &Surroundings) -> ShutterState {
+        ShutterState::new(&self.parameters, self.key, &self.classes, view, surroundings)
     }
 
     /// Maximum distance of a streak from the camera, m.
@@ -173,8 +130,7 @@ impl Rain {
     pub(super) fn extinction(&self, t: f64) -> RainExtinction {
         let sizes = DropSizeDistribution::marshall_palmer(self.rate(t));
         let gain = self.parameters.opacity_gain;
-        let disc = |class: &DropClass| 0.25e-6 * std::f64::consts::PI * class.bin.diameter_mm * class.bin.diameter_mm;
-        let streaks: f64 = self.classes.iter().map(|class| class.bin.count(&sizes) * disc(class)).sum();
+        let streaks = self.classes.blocked_area(&sizes);
         let all = extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL);
         RainExtinction { all: gain * all.max(streaks), streaks: gain * streaks }
     }

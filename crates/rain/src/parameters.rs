@@ -2,8 +2,6 @@
 
 use bansho_base::parameters::{Length, Range, animated::Animated};
 
-use crate::{drops::terminal_velocity::VelocityLaw, opacity_law::OpacityLaw};
-
 /// The paper's six diameters, mm.
 const PAPER_DIAMETERS_MM: [f64; 6] = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0];
 
@@ -17,6 +15,26 @@ bansho_base::choice! {
         /// To the letter of that paper: streak textures of 512 x 512 pixels in 8 bits for fixed rain rates, on billboards around the camera that are lit at
         /// their corners. No wind, no sky light, no airlight; the textures repeat, and change abruptly with the rain rate.
         Textures = "textures",
+    }
+}
+
+bansho_base::choice! {
+    /// Law of the terminal velocities.
+    pub enum VelocityLaw {
+        /// Measured by Gunn and Kinzer: large drops flatten and fall at 9.2 m/s at most.
+        GunnKinzer = "gunn_kinzer",
+        /// The paper's equations (2) to (4) for a rigid sphere: 4 % too slow at 1 mm, 29 % too fast at 5 mm.
+        RigidSphere = "rigid_sphere",
+    }
+}
+
+bansho_base::choice! {
+    /// Law of the opacity of streaks.
+    pub enum OpacityLaw {
+        /// Fraction of the exposure during which the drop covers a point.
+        ExposureFraction = "exposure_fraction",
+        /// 2 D / v as Yoshida, Dobashi & Yamamoto print it, with D in mm and v in m/s: 67 times as much on the axis in 1/30 s, and the same for any exposure.
+        Paper = "paper",
     }
 }
 

@@ -3,19 +3,16 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    geometry::point_cloud::PointCloud,
-    host::observer::{Cancelled, Observer, check},
     parameters::BuildError,
     phenomenon::{
-        Phenomenon, PhenomenonInfo, Prepared, Remark, Run,
-        strip::{DepthInterval, Shutter, View},
-        surroundings::{Emitter, Light, OtherPhenomena, Publication, Surroundings},
+        Phenomenon, PhenomenonInfo, Remark, Run,
+        surroundings::{Light, OtherPhenomena},
     },
     tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
-use super::{model::Rain, parameters::RainParameters};
-use crate::{aovs::AOVS, raindrop, render::prepared::PreparedRain};
+use super::{model::Rain, parameters::RainParameters, run::RainRun};
+use crate::aovs::AOVS;
 
 impl RainParameters {
     /// The table `[[rain]]`.
@@ -71,44 +68,6 @@ impl Phenomenon for Rain {
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {
-        Box::new(self)
-    }
-}
-
-impl Run for Rain {
-    fn publish(&self, shutter: Shutter) -> Publication {
-        Publication { extinction: self.extinction(shutter.middle()).all, ..Publication::default() }
-    }
-
-    /// Rain fills all depths. Its intervals end at the depths of lights, so that a fire has streaks in front of, within and behind it.
-    fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
-        const MAX_LIGHTS: usize = 8;
-        const MIN_LENGTH: f64 = 0.05;
-        let (near, far) = (view.camera.near, self.reach(surroundings));
-        let depth = |light: &Light| match light.emitter {
-            Emitter::Directional { .. } => None,
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(view.camera.depth(position)),
-        };
-        let lights = surroundings.others.lights.iter().filter_map(depth);
-        let mut edges: Vec<f64> = lights.filter(|depth| *depth > near && *depth < far).take(MAX_LIGHTS).collect();
-        edges.extend([near, far]);
-        edges.sort_by(f64::total_cmp);
-        edges.dedup_by(|next, last| *next - *last < MIN_LENGTH);
-        edges.windows(2).map(|pair| DepthInterval { near: pair[0], far: pair[1] }).collect()
-    }
-
-    fn prepare<'a>(
-        &'a self,
-        view: &'a View,
-        surroundings: &'a Surroundings<'a>,
-        observer: &dyn Observer,
-    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-        check(observer)?;
-        Ok(Box::new(PreparedRain::new(self, view, surroundings)))
-    }
-
-    /// [`Rain::drops`], with their diameters and opacities.
-    fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
-        Some(raindrop::point_cloud(&self.drops(view, surroundings), view.export_origin))
+        Box::new(RainRun::new(self))
     }
 }

@@ -12,8 +12,9 @@ use fearless_simd::dispatch;
 use crate::{
     Rain,
     drops::{
+        classes::DropClassState,
         lattice::{CELL_SIZE, LatticeCell},
-        shutter_state::{DropClassState, ShutterState},
+        shutter_state::ShutterState,
     },
     streaks::{
         cell_drops::{CellDrops, DropBatch},
@@ -43,7 +44,7 @@ pub struct Raindrop {
     pub weight: f64,
     /// Fraction of the exposure before the drop lands, 0 to 1.
     pub exposed_fraction: f64,
-    /// Factor of the opacity: `opacity_gain` times that of the law of opacity ([`OpacityLaw::factor`](crate::opacity_law::OpacityLaw::factor)). 1 by
+    /// Factor of the opacity: `opacity_gain` times that of the law of opacity ([`OpacityLaw::factor`](crate::OpacityLaw::factor)). 1 by
     /// default.
     pub opacity_factor: f64,
     /// Opacity on the axis of its streak, away from its ends, seen from the side by a camera at rest: the fraction `2 r / (v T)` of the exposure during which
@@ -98,7 +99,7 @@ impl Rain {
     /// ```
     #[must_use]
     pub fn drops(&self, view: &View, surroundings: &Surroundings) -> Vec<Raindrop> {
-        let shutter_state = ShutterState::new(self, view, surroundings);
+        let shutter_state = self.shutter_state(view, surroundings);
         let bounds = shutter_state.around_camera(1.1 * shutter_state.distance);
         let level = bansho_base::math::simd::level();
         let chunks = map_cell_chunks(&shutter_state, &[bounds], 0.5 * CELL_SIZE, |cells| {

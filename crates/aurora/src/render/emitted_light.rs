@@ -7,11 +7,11 @@ use bansho_base::{
 use fearless_simd::dispatch;
 
 use crate::{
-    Aurora,
     render::{
         project::field_lines::{EARTH_RADIUS_KM, FOOT_ALTITUDE_KM},
         shade::attenuation::EmitterColors,
     },
+    simulate::AuroraSimulation,
 };
 
 /// Approximate number of particles that are sampled.
@@ -29,39 +29,38 @@ fn toward_km(position: DVec2) -> DVec3 {
     DVec3::new(level.x, cos, level.y) * (EARTH_RADIUS_KM + ALTITUDE_KM) - DVec3::Y * EARTH_RADIUS_KM
 }
 
-impl Aurora {
-    /// One directional light from the weighted mean direction, with the irradiance of the whole aurora on a plane that
-    /// faces it, for receivers on the ground below the drawn square's center; `None` where nothing shines. Each
-    /// particle has the color of its own electron energy; particles below the horizon are skipped.
-    pub(crate) fn directional_light(&self) -> Option<Light> {
-        let (emission, particles) = (self.simulation().emission(), self.simulation().particles());
-        let level = bansho_base::math::simd::level();
-        let stride = particles.len().div_ceil(MAX_SAMPLED_PARTICLES).max(1);
-        let (mut direction_sum, mut sum) = (DVec3::ZERO, DVec3::ZERO);
-        for index in (0..particles.len()).step_by(stride) {
-            let toward = toward_km(particles.position(index));
-            let squared = toward.length_squared();
-            let direction = toward / math::sqrt(squared);
-            let elevation = direction.y as f32;
-            if elevation <= 0.0 {
-                continue;
-            }
-            let column =
-                emission.column(f64::from(particles.energies_ev[index])).kilorayleigh.map(|value| value as f32);
-            // A patch of 1 mW/m^2 over 1 km^2 at 1 km subtends 1 sr and has the column's brightness.
-            let solid_angle = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
-            let color: [f32; 4] = dispatch!(level, simd => self.emitter_colors().attenuated(simd, &column, EmitterColors::table_coordinate(elevation)).into());
-            let [red, green, blue, _] = color.map(f64::from);
-            sum += DVec3::new(red, green, blue) * solid_angle;
-            direction_sum += direction * (solid_angle * green.max(0.0));
+/// One directional light from the weighted mean direction, with the irradiance of the whole aurora on a plane that
+/// faces it, for receivers on the ground below the drawn square's center; `None` where nothing shines. Each
+/// particle has the color of its own electron energy; particles below the horizon are skipped.
+pub(crate) fn directional_light(simulation: &AuroraSimulation, emitter_colors: &EmitterColors) -> Option<Light> {
+    let (emission, particles) = (simulation.emission(), simulation.particles());
+    let level = bansho_base::math::simd::level();
+    let stride = particles.len().div_ceil(MAX_SAMPLED_PARTICLES).max(1);
+    let (mut direction_sum, mut sum) = (DVec3::ZERO, DVec3::ZERO);
+    for index in (0..particles.len()).step_by(stride) {
+        let toward = toward_km(particles.position(index));
+        let squared = toward.length_squared();
+        let direction = toward / math::sqrt(squared);
+        let elevation = direction.y as f32;
+        if elevation <= 0.0 {
+            continue;
         }
-        let toward = direction_sum.try_normalize()?;
-        Some(Light { emitter: Emitter::Directional { toward }, intensity: sum.to_array().map(|value| value as f32) })
+        let column = emission.column(f64::from(particles.energies_ev[index])).kilorayleigh.map(|value| value as f32);
+        // A patch of 1 mW/m^2 over 1 km^2 at 1 km subtends 1 sr and has the column's brightness.
+        let solid_angle = f64::from(particles.powers_w[index]) / W_PER_UNIT * stride as f64 / squared;
+        let color: [f32; 4] = dispatch!(level, simd => emitter_colors.attenuated(simd, &column, EmitterColors::table_coordinate(elevation)).into());
+        let [red, green, blue, _] = color.map(f64::from);
+        sum += DVec3::new(red, green, blue) * solid_angle;
+        direction_sum += direction * (solid_angle * green.max(0.0));
     }
+    let toward = direction_sum.try_normalize()?;
+    Some(Light { emitter: Emitter::Directional { toward }, intensity: sum.to_array().map(|value| value as f32) })
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use bansho_base::{
         host::assets::MemoryAssets,
         math::curve::{Curve, Interpolation},
@@ -70,7 +69,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        AuroraParameters, ParticleParameters,
+        Aurora, AuroraParameters, AuroraRun, ParticleParameters,
         shapes::{ShapeParameters, SheetParameters},
     };
 
@@ -88,7 +87,9 @@ mod tests {
             shapes: vec![ShapeParameters { sheets: vec![sheet], ..ShapeParameters::default() }],
             ..AuroraParameters::default()
         };
-        Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap().directional_light()
+        let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
+        let run = AuroraRun::new(Arc::new(aurora));
+        directional_light(run.simulation(), &run.render_inputs().tables.emitter_colors)
     }
 
     #[test]

@@ -8,7 +8,8 @@
 
 pub(crate) mod aovs;
 pub(crate) mod bin;
-mod emitted_light;
+pub(crate) mod emitted_light;
+pub(crate) mod inputs;
 pub(crate) mod integrate;
 pub(crate) mod maps;
 pub(crate) mod prepared;

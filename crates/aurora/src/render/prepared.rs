@@ -20,9 +20,8 @@ use bansho_base::{
 };
 use fearless_simd::{Level, Simd, dispatch};
 
-use super::{Blur, maps::CellMaps};
+use super::{Blur, inputs::RenderInputs, maps::CellMaps, shutter};
 use crate::{
-    Aurora,
     physics::emission::{PerEmitter, SpectralEmitter},
     render::{
         aovs::{BRIGHTNESSES, brightnesses},
@@ -51,7 +50,7 @@ pub(crate) const DEPTHS: DepthInterval = DepthInterval { near: 2e4, far: 1e10 };
 
 /// A frame that is ready to be drawn in strips.
 pub(crate) struct PreparedAurora<'a> {
-    aurora: &'a Aurora,
+    inputs: RenderInputs<'a>,
     view: &'a View,
     level: Level,
     cameras: Vec<Camera>,
@@ -81,16 +80,16 @@ enum DisplayedLight {
 }
 
 impl<'a> PreparedAurora<'a> {
-    pub(crate) fn new(aurora: &'a Aurora, view: &'a View, observer: &dyn Observer) -> Result<Self, Cancelled> {
-        let field = aurora.field_lines(view.camera.position);
-        let sources = aurora.sources(view, &field);
+    pub(crate) fn new(inputs: RenderInputs<'a>, view: &'a View, observer: &dyn Observer) -> Result<Self, Cancelled> {
+        let field = inputs.field_lines(view.camera.position);
+        let sources = shutter::sources(inputs.simulation, view, &field);
         check(observer)?;
-        let charts = ChartBuilder { aurora, field: &field, coverage: Coverage::of_view(view, &field) };
+        let charts = ChartBuilder { inputs, field: &field, coverage: Coverage::of_view(view, &field) };
         let (sharp, soft) = parallel::join(|| charts.sharp(&sources), || charts.soft(&sources));
         check(observer)?;
-        let rendering = &aurora.simulation().parameters().rendering;
+        let rendering = &inputs.simulation.parameters().rendering;
         let measured = view.aovs_requested.then(|| [sharp.clone(), soft.clone()]);
-        let emitter_colors = aurora.emitter_colors_above(field.observer_altitude_km());
+        let emitter_colors = inputs.emitter_colors_above(field.observer_altitude_km());
         let displayed = if rendering.blur_space == Blur::Screen {
             let samplers = [sharp.sampler(), soft.sampler()];
             DisplayedLight::BlurredImage(BlurredImage::new(view, &field, &samplers, &rendering.blur_radii))
@@ -101,7 +100,7 @@ impl<'a> PreparedAurora<'a> {
         let cameras =
             if matches!(displayed, DisplayedLight::BlurredImage(_)) { vec![view.camera] } else { view.cameras() };
         Ok(Self {
-            aurora,
+            inputs,
             view,
             level: bansho_base::math::simd::level(),
             cameras,
@@ -112,7 +111,7 @@ impl<'a> PreparedAurora<'a> {
             emitter_colors,
             displayed,
             measured,
-            brightnesses: brightnesses(aurora.simulation().emission().lines()).collect(),
+            brightnesses: brightnesses(inputs.simulation.emission().lines()).collect(),
             maps: OnceLock::new(),
         })
     }
@@ -121,14 +120,14 @@ impl<'a> PreparedAurora<'a> {
 impl Drop for PreparedAurora<'_> {
     fn drop(&mut self) {
         if let DisplayedLight::Chart(chart) = &mut self.displayed {
-            self.aurora.chart_memory.recycle(chart);
+            self.inputs.chart_memory.recycle(chart);
         }
     }
 }
 
 /// Shared inputs of the charts of a frame.
 pub(super) struct ChartBuilder<'a> {
-    pub(super) aurora: &'a Aurora,
+    pub(super) inputs: RenderInputs<'a>,
     pub(super) field: &'a FieldLines,
     pub(super) coverage: Coverage,
 }
@@ -140,14 +139,14 @@ impl ChartBuilder<'_> {
         // The angle of the spread at the minimum distance of such light.
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
-        let buffer = self.aurora.chart_memory.zeros(chart);
+        let buffer = self.inputs.chart_memory.zeros(chart);
         let sorted = |columns| SortedSources::new(&sources.sharp, &buffer.chart, columns, self.field, spread_km);
-        let Some(collisions) = self.aurora.collisions() else {
+        let Some(collisions) = &self.inputs.tables.collisions else {
             let sorted_sources = sorted(BLOCK_COLUMNS);
-            return buffer.integrate(self.field, self.aurora.profiles(), &sorted_sources);
+            return buffer.integrate(self.field, &self.inputs.tables.profiles, &sorted_sources);
         };
         let sorted_sources = sorted(COLLISION_BLOCK_COLUMNS);
-        let step = (self.aurora.simulation().time() / AuroraSimulation::STEP_S).round() as i64 as u32;
+        let step = (self.inputs.simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
         collisions.draw(buffer, self.field, &sorted_sources, step)
     }
 
@@ -159,7 +158,8 @@ impl ChartBuilder<'_> {
         let chart = Chart::new(&self.coverage, column, (0.25 * column).max(pixel));
         let sorted_sources = SortedSources::new(&sources.soft, &chart, BLOCK_COLUMNS, self.field, spread_km);
         // Always from the mean profile: a cell that shines for a minute averages thousands of tracks.
-        let mut buffer = ColumnBuffer::zeros(chart).integrate(self.field, self.aurora.red_profiles(), &sorted_sources);
+        let mut buffer =
+            ColumnBuffer::zeros(chart).integrate(self.field, &self.inputs.tables.red_profiles, &sorted_sources);
         buffer.sum_red_altitudes();
         buffer
     }
@@ -346,7 +346,7 @@ impl PreparedAurora<'_> {
         for (plane, (emitter, photons)) in strip.aovs.iter_mut().zip(&self.brightnesses) {
             plane.add(index, light[emitter.index()] * *photons as f32, 1.0);
         }
-        let maps = self.maps.get_or_init(|| CellMaps::new(self.aurora.simulation()));
+        let maps = self.maps.get_or_init(|| CellMaps::new(self.inputs.simulation));
         let Some(position) = direction.and_then(|direction| self.field.foot_position(direction)) else { return };
         for (plane, value) in strip.aovs.iter_mut().skip(BRIGHTNESSES).zip(maps.at(position)) {
             plane.add(index, value, camera_weight);

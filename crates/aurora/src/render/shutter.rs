@@ -6,9 +6,9 @@ use bansho_base::{
 };
 
 use crate::{
-    Aurora,
     render::{
         bin::sources::{SampleTimes, Sources},
+        inputs::emission_inputs,
         project::field_lines::FieldLines,
     },
     simulate::AuroraSimulation,
@@ -34,50 +34,45 @@ pub(crate) fn step_until(simulation: &mut AuroraSimulation, t: f64) {
     }
 }
 
-impl Aurora {
-    /// Sources while the shutter of a view is open.
-    pub(super) fn sources(&self, view: &View, field: &FieldLines) -> Sources {
-        if is_long(view.shutter) { self.long_exposure(view, field) } else { self.short_exposure(view, field) }
-    }
+/// Sources while the shutter of a view is open.
+pub(super) fn sources(simulation: &AuroraSimulation, view: &View, field: &FieldLines) -> Sources {
+    if is_long(view.shutter) { long_exposure(simulation, view, field) } else { short_exposure(simulation, view, field) }
+}
 
-    /// Extrapolated particles of the current state, and its afterglow.
-    fn short_exposure(&self, view: &View, field: &FieldLines) -> Sources {
-        let inputs = self.emission_inputs(self.simulation(), view.shutter.middle());
-        let distance_km = rms_speed(self.simulation()) * view.shutter.duration();
-        let count =
-            (2.0 * distance_km / (SPREADS_PER_INSTANT * inputs.spread_km())).ceil().clamp(1.0, MAX_INSTANTS) as usize;
-        let now = self.simulation().time();
-        let offsets_s = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
-        Sources::new(
-            &inputs,
-            field,
-            &SampleTimes { offsets_s, first_index: 0, smear_km: smear_km(distance_km / count as f64) },
-        )
-    }
+/// Extrapolated particles of the current state, and its afterglow.
+fn short_exposure(simulation: &AuroraSimulation, view: &View, field: &FieldLines) -> Sources {
+    let inputs = emission_inputs(simulation, view.shutter.middle());
+    let distance_km = rms_speed(simulation) * view.shutter.duration();
+    let count =
+        (2.0 * distance_km / (SPREADS_PER_INSTANT * inputs.spread_km())).ceil().clamp(1.0, MAX_INSTANTS) as usize;
+    let now = simulation.time();
+    let offsets_s = (0..count).map(|instant| view.shutter.instant(instant, count) - now).collect();
+    Sources::new(
+        &inputs,
+        field,
+        &SampleTimes { offsets_s, first_index: 0, smear_km: smear_km(distance_km / count as f64) },
+    )
+}
 
-    /// Mean of the states during the exposure.
-    ///
-    /// It starts at the state of [`Stepped::time_for`](bansho_base::phenomenon::Stepped::time_for); in a
-    /// loop, where two runs are drawn at the shutter's middle, with that one.
-    fn long_exposure(&self, view: &View, field: &FieldLines) -> Sources {
-        let mut simulation = self.simulation().clone();
-        let (shutter, now) = (view.shutter, simulation.time());
-        let begin = if now < shutter.middle() - AuroraSimulation::STEP_S { shutter.open } else { shutter.middle() };
-        let mut mean = Sources::default();
-        for instant in 0..LONG_INSTANTS {
-            let t = begin - shutter.open + shutter.instant(instant, LONG_INSTANTS);
-            step_until(&mut simulation, t);
-            let distance_km = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
-            let first = instant as u32;
-            let times = SampleTimes {
-                offsets_s: vec![t - simulation.time()],
-                first_index: first,
-                smear_km: smear_km(distance_km),
-            };
-            mean.add(&Sources::new(&self.emission_inputs(&simulation, t), field, &times), 1.0 / LONG_INSTANTS as f32);
-        }
-        mean
+/// Mean of the states during the exposure.
+///
+/// It starts at the state of [`Stepped::time_for`](bansho_base::phenomenon::Stepped::time_for); in a
+/// loop, where two runs are drawn at the shutter's middle, with that one.
+fn long_exposure(simulation: &AuroraSimulation, view: &View, field: &FieldLines) -> Sources {
+    let mut simulation = simulation.clone();
+    let (shutter, now) = (view.shutter, simulation.time());
+    let begin = if now < shutter.middle() - AuroraSimulation::STEP_S { shutter.open } else { shutter.middle() };
+    let mut mean = Sources::default();
+    for instant in 0..LONG_INSTANTS {
+        let t = begin - shutter.open + shutter.instant(instant, LONG_INSTANTS);
+        step_until(&mut simulation, t);
+        let distance_km = rms_speed(&simulation) * shutter.duration() / LONG_INSTANTS as f64;
+        let first = instant as u32;
+        let times =
+            SampleTimes { offsets_s: vec![t - simulation.time()], first_index: first, smear_km: smear_km(distance_km) };
+        mean.add(&Sources::new(&emission_inputs(&simulation, t), field, &times), 1.0 / LONG_INSTANTS as f32);
     }
+    mean
 }
 
 /// Root mean square speed of the particles, km/s.
@@ -94,6 +89,8 @@ fn smear_km(distance_km: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use bansho_base::{
         camera::CameraParameters,
         host::{assets::MemoryAssets, observer::Unobserved},
@@ -107,30 +104,30 @@ mod tests {
     };
 
     use super::*;
-    use crate::{AuroraParameters, FoldParameters, ParticleParameters};
+    use crate::{Aurora, AuroraParameters, AuroraRun, FoldParameters, ParticleParameters};
 
     const SIZE: [usize; 2] = [96, 64];
 
-    fn aurora() -> Aurora {
+    fn run() -> AuroraRun {
         let parameters = AuroraParameters {
             particles: ParticleParameters { count: 4000, ..ParticleParameters::default() },
             folds: FoldParameters { amplitude_km: 12.0, speed_km_per_s: 12.0, ..FoldParameters::default() },
             preroll_s: 0.5,
             ..AuroraParameters::default()
         };
-        Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap()
+        AuroraRun::new(Arc::new(Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap()))
     }
 
     /// The green light of an exposure, after the steps that a shot takes for it.
-    fn exposed(aurora: &mut Aurora, shutter: Shutter) -> Vec<f64> {
+    fn exposed(run: &mut AuroraRun, shutter: Shutter) -> Vec<f64> {
         let mut camera = CameraParameters::default();
         camera.look_up();
         let wind = Wind::new(WindParameters::default(), 1, None);
         let surroundings = Surroundings::from_wind(&wind);
-        let from = aurora.time_for(shutter);
-        step_until(aurora.simulation_mut().unwrap(), from);
+        let from = run.time_for(shutter);
+        step_until(run.simulation_mut(), from);
         let view = View::new(camera, shutter, 0.0, SIZE, 0);
-        let prepared = aurora.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let prepared = run.prepare(&view, &surroundings, &Unobserved).unwrap();
         let mut strip = Strip::default();
         strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
         prepared.draw(&DepthInterval::ALL, &mut strip);
@@ -144,32 +141,31 @@ mod tests {
     #[test]
     fn a_long_exposure_is_the_mean_of_short_ones() {
         let long = Shutter { open: 0.0, close: 2.0 };
-        let picture = exposed(&mut aurora(), long);
-        let mut moving = aurora();
+        let picture = exposed(&mut run(), long);
+        let mut moving = run();
         let mut mean = vec![0.0; picture.len()];
         for instant in 0..LONG_INSTANTS {
             let t = long.instant(instant, LONG_INSTANTS);
             let short = exposed(&mut moving, Shutter { open: t, close: t });
             mean.iter_mut().zip(short).for_each(|(sum, light)| *sum += light / LONG_INSTANTS as f64);
         }
-        let instant = exposed(&mut aurora(), Shutter { open: 1.0, close: 1.0 });
+        let instant = exposed(&mut run(), Shutter { open: 1.0, close: 1.0 });
         let (from_mean, from_instant) = (apart(&picture, &mean), apart(&picture, &instant));
         assert!(from_mean < 0.05 && from_instant > 3.0 * from_mean, "{from_mean} {from_instant}");
     }
 
     #[test]
     fn particles_are_those_of_the_middle_of_an_exposure() {
-        let mut aurora = aurora();
-        step_until(aurora.simulation_mut().unwrap(), 0.0);
-        let early = aurora.clone();
-        step_until(aurora.simulation_mut().unwrap(), 1.0);
+        let (mut early, mut late) = (run(), run());
+        step_until(early.simulation_mut(), 0.0);
+        step_until(late.simulation_mut(), 1.0);
         let wind = Wind::new(WindParameters::default(), 1, None);
-        let exported = |aurora: &Aurora, middle: f64| {
+        let exported = |run: &AuroraRun, middle: f64| {
             let shutter = Shutter { open: middle - 0.5, close: middle + 0.5 };
             let view = View::new(CameraParameters::default(), shutter, 0.0, SIZE, 0);
-            aurora.export(&view, &Surroundings::from_wind(&wind)).unwrap()
+            run.export(&view, &Surroundings::from_wind(&wind)).unwrap()
         };
-        assert_eq!(exported(&early, 1.0), exported(&aurora, 1.0));
-        assert_ne!(exported(&early, 0.0), exported(&aurora, 1.0));
+        assert_eq!(exported(&early, 1.0), exported(&late, 1.0));
+        assert_ne!(exported(&early, 0.0), exported(&late, 1.0));
     }
 }

@@ -30,8 +30,8 @@ pub use parameters::{
 };
 pub(crate) use sequence::ControlPointIds;
 pub use sequence::Sequence;
-pub use shape::{Shape, Sheet};
-pub use strokes::intersection::{SegmentId, count_crossings, first_crossing};
+pub use shape::{SegmentId, Shape, Sheet};
+pub use strokes::intersection::{count_crossings, first_crossing};
 
 /// Altitude of the drawn plane, km.
 pub(crate) const FOOT_ALTITUDE_KM: f64 = 100.0;

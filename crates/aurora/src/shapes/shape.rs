@@ -32,9 +32,13 @@ impl Shape {
         let length = |sheet: &Sheet| sheet.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
         self.sheets.iter().map(length).sum()
     }
+}
 
-    /// Number of crossing pairs of segments: 0 for key shapes, possibly more for in-between shapes.
-    pub fn crossings(&self) -> usize {
-        super::count_crossings(&self.sheets)
-    }
+/// A segment of a sheet, indices from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SegmentId {
+    /// The sheet.
+    pub sheet: usize,
+    /// The segment, from point `segment` to the next.
+    pub segment: usize,
 }

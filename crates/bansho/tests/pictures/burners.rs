@@ -1,5 +1,7 @@
 //! Burners that need a file: gas from the surface of a glTF mesh.
 
+use std::sync::Arc;
+
 use bansho::{
     base::{
         host::assets::MemoryAssets,
@@ -10,7 +12,7 @@ use bansho::{
             wind::{Wind, WindParameters},
         },
     },
-    fire::particles::{BurnerParameters, BurnerShape, FlameParticles, FlameParticlesParameters},
+    fire::particles::{BurnerParameters, BurnerShape, FlameParticles, FlameParticlesParameters, FlameParticlesRun},
     media::{gltf::decode_mesh, limits::MemoryLimit},
 };
 
@@ -57,12 +59,13 @@ fn gas_comes_evenly_from_the_whole_surface_of_a_gltf_mesh() {
         ..Default::default()
     };
     let parameters = FlameParticlesParameters { burners: vec![burner], particles: 60_000, ..Default::default() };
-    let mut flame = FlameParticles::new(parameters, "mesh", 1, None, &assets).unwrap();
+    let flame = FlameParticles::new(parameters, "mesh", 1, None, &assets).unwrap();
     let (wind, air) = (Wind::new(WindParameters::default(), 1, None), Air::default());
     let around = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
     let stepping = flame.info().stepping.unwrap();
-    (0..6).for_each(|taken| flame.step(stepping.time_after(taken), &around));
-    let [x, y, z] = flame.particles().positions();
+    let mut run = FlameParticlesRun::new(Arc::new(flame));
+    (0..6).for_each(|taken| run.step(stepping.time_after(taken), &around));
+    let [x, y, z] = run.particles().positions();
     assert!(x.len() > 1500, "{}", x.len());
     let area = |leg: f32| 0.5 * f64::from(leg) * f64::from(leg);
     let whole: f64 = TRIANGLES.iter().map(|(_, leg)| area(*leg)).sum();

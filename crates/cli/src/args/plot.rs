@@ -8,7 +8,7 @@ use bansho::{
         physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV},
     },
     base::color::blackbody::{HIGHEST_K, LOWEST_K},
-    rain::drops::terminal_velocity::VelocityLaw,
+    rain::VelocityLaw,
 };
 use clap::{
     Args, Subcommand,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bansho::{
     BitDepth,
     job::{StreakFormat, Streaks},
-    rain::{billboards::texture::StreakCube, drops::terminal_velocity::VelocityLaw, opacity_law::OpacityLaw},
+    rain::{OpacityLaw, VelocityLaw, billboards::texture::StreakCube},
 };
 
 use super::{

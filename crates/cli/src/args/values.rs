@@ -6,7 +6,7 @@ use bansho::{
     AlphaConvention, BitDepth, Rect, View,
     job::frames::{self, FrameListError},
     job::{ContactBackground, FlipbookCrop, StreakFormat},
-    rain::{drops::terminal_velocity::VelocityLaw, opacity_law::OpacityLaw},
+    rain::{OpacityLaw, VelocityLaw},
     scene::picture::LARGEST_SIDE,
 };
 use clap::builder::{PossibleValuesParser, TypedValueParser};

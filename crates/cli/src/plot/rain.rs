@@ -1,9 +1,10 @@
 //! Rain: drop sizes, terminal velocities and the opacity of streaks (Yoshida, Dobashi & Yamamoto).
 
 use bansho::rain::{
+    VelocityLaw,
     drops::{
         size_distribution::DropSizeDistribution,
-        terminal_velocity::{FallAir, TerminalVelocity, VelocityLaw},
+        terminal_velocity::{FallAir, TerminalVelocity},
     },
     streaks::coverage::Streak,
 };

@@ -52,8 +52,8 @@
 //! 3. Once per step `simulate::combustion` smooths velocity and temperature, burns fuel, forms soot and cools;
 //!    `simulate::forces` provides wind, entrainment toward the plume axis, vortex rings and turbulence.
 //!    `simulate::euler` is a step of the paper's algorithm instead (`gas_model = "euler"`).
-//! 4. `simulate::snapshot` serializes the particles; `past_states` keeps the states of a long exposure; `phenomenon` is the interface to the rest of
-//!    Bansho.
+//! 4. `simulate::snapshot` serializes the particles; `past_states` keeps the states of a long exposure; `run` steps and draws one shot, and
+//!    `phenomenon` is what all shots share, as the rest of Bansho sees it.
 //! 5. To draw a frame, `render::depth_layers` gathers statistics and defines depth layers, and `render::project` turns particles into
 //!    elliptical sprites.
 //! 6. `render::splat` sums sprites on a grid; `render::resolve` interpolates it by splines, adds detail and converts it to light.
@@ -67,6 +67,7 @@ mod parameters;
 mod past_states;
 mod phenomenon;
 pub mod render;
+mod run;
 pub mod simulate;
 #[cfg(test)]
 mod tests;
@@ -77,6 +78,7 @@ pub use parameters::{
     BurnerParameters, BurnerShape, CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters,
     GasModel, NegativePressure, TemperatureLaw, WindForce,
 };
+pub use run::FlameParticlesRun;
 pub use simulate::{
     burner::heskestad,
     derived::check_particle_count,

@@ -4,15 +4,9 @@ use std::sync::Arc;
 
 use bansho_base::{
     color,
-    geometry::point_cloud::{PointCloud, Quantity},
-    host::observer::{Cancelled, Observer},
     math::{self, DVec3},
     parameters::BuildError,
-    phenomenon::{
-        Phenomenon, PhenomenonInfo, Prepared, Remark, Run, SnapshotError, Stepped, Stepping,
-        strip::{DepthInterval, Shutter, View},
-        surroundings::{OtherPhenomena, Publication, Surroundings},
-    },
+    phenomenon::{Phenomenon, PhenomenonInfo, Remark, Run, Stepping, surroundings::OtherPhenomena},
     tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
@@ -23,15 +17,14 @@ use super::{
         BurnerParameters, CombustionParameters, FlameParticlesParameters, FluidParameters, ForceParameters, GasModel,
         TemperatureLaw,
     },
-    render::{self, PreparedGas, SpriteStyle},
+    render::{self, SpriteStyle},
+    run::FlameParticlesRun,
 };
 use crate::{
     GAS_FLOW, POSITION,
     particles::simulate::{
         burner::Burner,
-        derived::{DerivedConstants, check_particle_count},
-        particles::GasParticles,
-        snapshot,
+        derived::{BYTES_PER_PARTICLE, DerivedConstants, check_particle_count},
     },
 };
 
@@ -110,28 +103,28 @@ impl PhenomenonTable for FlameParticlesParameters {
 
 impl Phenomenon for FlameParticles {
     fn info(&self) -> PhenomenonInfo<'_> {
-        let DerivedConstants { preroll, crossfade, .. } = *self.simulation.constants;
-        let stepping = Stepping { step: self.parameters.step_s, preroll, crossfade };
-        let refracts = self.parameters.rendering.heat_haze_gain > 0.0;
+        let DerivedConstants { preroll, crossfade, .. } = self.constants.derived;
+        let stepping = Stepping { step: self.parameters().step_s, preroll, crossfade };
+        let refracts = self.parameters().rendering.heat_haze_gain > 0.0;
         PhenomenonInfo { aovs: render::AOVS, stepping: Some(stepping), refracts, ..PhenomenonInfo::new(&self.name) }
     }
 
     fn memory_bytes(&self, pixels: f64) -> f64 {
-        // Measured: state and neighbor lists of each particle, and the grids of the picture.
-        1e6 + 560.0 * self.parameters.particles as f64 + 44.0 * pixels
+        // Measured: what is fixed, the particles, and the grids of the picture.
+        1e6 + BYTES_PER_PARTICLE * self.parameters().particles as f64 + 44.0 * pixels
     }
 
     fn luminance(&self) -> f64 {
         /// Mean luminance of the bright parts, relative to a uniform flame with soot of the highest temperature.
         const BRIGHT_PARTS: f64 = 0.09;
-        let hottest = match (self.parameters.gas_model, self.parameters.combustion.temperature_model) {
-            (GasModel::Combustion, TemperatureLaw::Simulated) => self.parameters.combustion.flame_temperature_k,
+        let hottest = match (self.parameters().gas_model, self.parameters().combustion.temperature_model) {
+            (GasModel::Combustion, TemperatureLaw::Simulated) => self.parameters().combustion.flame_temperature_k,
             (GasModel::Euler, _) | (_, TemperatureLaw::Constant) => self.tallest_burner().parameters.temperature_k,
         };
         let black_body = f64::from(color::luminance(color::black_body().radiance(hottest as f32)));
         let absorption =
-            render::soot_absorption(self.parameters.combustion.soot_ppm * 1e-6, &self.parameters.rendering);
-        let emissivity = match self.parameters.rendering.sprite {
+            render::soot_absorption(self.parameters().combustion.soot_ppm * 1e-6, &self.parameters().rendering);
+        let emissivity = match self.parameters().rendering.sprite {
             SpriteStyle::LineIntegral => -math::exp_m1(-absorption * 0.5 * self.tallest_burner().diameter),
             SpriteStyle::Poly6 | SpriteStyle::Squares => 1.0,
         };
@@ -139,18 +132,18 @@ impl Phenomenon for FlameParticles {
     }
 
     fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
-        let burners = &self.simulation.constants.burners;
+        let burners = &self.constants.derived.burners;
         let emits_gas = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
         if !burners.iter().any(emits_gas) {
             return Some(Remark::new("none of its burners emits gas; set a `flow` above 0"));
         }
-        if let Some(key) = table_without_effect(&self.parameters) {
+        if let Some(key) = table_without_effect(self.parameters()) {
             return Some(Remark::at(key, format!("`{key}` sets something without effect; {EULER_KEYS}")));
         }
-        let origin = DVec3::from(self.parameters.position);
+        let origin = DVec3::from(self.parameters().position);
         let is_inside_obstacle = |burner: &Burner| {
             let is_inside = |id: u64| {
-                let position = origin + burner.spawn_point(self.simulation.key, id, 0.0).position;
+                let position = origin + burner.spawn_point(self.constants.key, id, 0.0).position;
                 neighbors.occluders().any(|occluder| occluder.signed_distance(position) < 0.0)
             };
             // 32 random spawn points represent the whole surface of the burner.
@@ -163,7 +156,7 @@ impl Phenomenon for FlameParticles {
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {
-        Box::new((*self).clone())
+        Box::new(FlameParticlesRun::new(self))
     }
 }
 
@@ -186,92 +179,4 @@ fn table_without_effect(parameters: &FlameParticlesParameters) -> Option<&'stati
         ),
     ];
     tables.into_iter().find(|(_, differs)| *gas_model == GasModel::Euler && *differs).map(|(key, _)| key)
-}
-
-impl Run for FlameParticles {
-    fn publish(&self, shutter: Shutter) -> Publication {
-        let lights = render::point_lights_of_exposure(&self.exposure(shutter), &self.parameters.rendering, shutter);
-        Publication { lights, ..Publication::default() }
-    }
-
-    fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
-        render::depth_intervals(
-            &self.exposure(view.shutter).middle,
-            &self.parameters.rendering,
-            view,
-            surroundings.wind,
-        )
-    }
-
-    fn prepare<'a>(
-        &'a self,
-        view: &'a View,
-        surroundings: &'a Surroundings<'a>,
-        observer: &dyn Observer,
-    ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
-        let (exposure, rendering) = (self.exposure(view.shutter), &self.parameters.rendering);
-        Ok(Box::new(PreparedGas::of_exposure(&exposure, rendering, view, surroundings, observer)?))
-    }
-
-    fn export(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
-        let t = view.shutter.middle();
-        let gas = self.exposure(view.shutter).middle;
-        let GasParticles { velocity: [u, v, w], temperature, density, .. } = gas.particles;
-        let positions = (0..gas.particles.len()).map(|index| gas.position(index, t).to_array());
-        let velocities = u.iter().zip(v).zip(w).map(|((u, v), w)| [*u, *v, *w]).collect();
-        let quantities = [(Quantity::Temperature, temperature.clone()), (Quantity::Density, density.clone())];
-        Some(PointCloud::new(view.export_origin, positions, velocities, quantities.into()))
-    }
-
-    fn as_stepped(&self) -> Option<&dyn Stepped> {
-        Some(self)
-    }
-
-    fn as_stepped_mut(&mut self) -> Option<&mut dyn Stepped> {
-        Some(self)
-    }
-}
-
-impl Stepped for FlameParticles {
-    fn step(&mut self, time: f64, surroundings: &Surroundings) {
-        self.past.keep(self.time, &self.simulation.particles);
-        self.simulation.step(time, surroundings);
-        self.time = time + self.simulation.step_s();
-        self.air_temperature_k = surroundings.air.temperature_k;
-    }
-
-    fn time_for(&self, shutter: Shutter) -> f64 {
-        if self.past.has_several(shutter) { shutter.close } else { shutter.middle() }
-    }
-
-    fn begin_exposure(&mut self, shutter: Shutter) {
-        self.past.begin(shutter);
-    }
-
-    fn keeps_states_for(&self, shutter: Shutter) -> bool {
-        self.past.keeps(shutter, self.time)
-    }
-
-    fn snapshot(&self) -> Vec<u8> {
-        let head = [self.time, self.air_temperature_k].into_iter().flat_map(f64::to_le_bytes);
-        let mut bytes: Vec<u8> = head.chain(snapshot::write(&self.simulation.particles)).collect();
-        self.past.write(&mut bytes);
-        bytes
-    }
-
-    fn restore(&mut self, state: &[u8]) -> Result<(), SnapshotError> {
-        let (time, rest) = state.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
-        let (air, rest) = rest.split_first_chunk::<8>().ok_or(SnapshotError::Damaged)?;
-        let (time, air) = (f64::from_le_bytes(*time), f64::from_le_bytes(*air));
-        if !time.is_finite() || !air.is_finite() {
-            return Err(SnapshotError::Damaged);
-        }
-        let burners = self.simulation.constants.burners.len();
-        let (state, past) = snapshot::split_first(rest)?;
-        let particles = snapshot::read(&self.simulation.particles, state, burners)?;
-        self.past.restore(self.past.read(past, &particles, burners)?);
-        self.simulation.particles = particles;
-        (self.time, self.air_temperature_k) = (time, air);
-        Ok(())
-    }
 }

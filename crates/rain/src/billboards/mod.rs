@@ -20,8 +20,9 @@ use stochastic_simplification::StochasticSimplification;
 
 use crate::{
     drops::{
+        classes::DropClassState,
         lattice::{CELL_SIZE, LatticeCell},
-        shutter_state::{DropClassState, DropState, Sphere, VisibleCell},
+        shutter_state::{DropState, Sphere, VisibleCell},
     },
     lanes::{LaneArray, ZERO_LANES},
     streaks::{

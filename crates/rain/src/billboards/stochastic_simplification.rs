@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use crate::drops::shutter_state::{DropClassState, ShutterState};
+use crate::drops::{classes::DropClassState, shutter_state::ShutterState};
 
 /// How much of the drops of a billboard is drawn.
 #[derive(Clone, Copy)]
@@ -51,8 +51,8 @@ mod tests {
     fn the_fraction_is_what_a_drop_shows_over_what_a_streak_may_show() {
         let calm = wind([0.0; 3], 0.0);
         let view = view_at(1.0, 1.0 / 60.0, [320, 180]);
-        let state =
-            ShutterState::new(&rain(streaks(Method::Billboards, 50.0), 1), &view, &Surroundings::from_wind(&calm));
+        let rain = rain(streaks(Method::Billboards, 50.0), 1);
+        let state = rain.shutter_state(&view, &Surroundings::from_wind(&calm));
         let class = state.classes.last().unwrap();
         let simplification = StochasticSimplification { white: 10.0, max_contribution: 0.01 };
         let fraction = |distance: f64, radiance: f64| simplification.fraction(&state, class, distance, radiance);

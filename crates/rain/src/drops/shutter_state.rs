@@ -1,10 +1,7 @@
 //! The state of the rain during one exposure: number, positions and motion of the drops of each diameter.
 
 use bansho_base::{
-    math::{
-        DVec2, DVec3,
-        random::{Key, Purpose},
-    },
+    math::{DVec2, DVec3, random::Key},
     phenomenon::{
         strip::{Shutter, View},
         surroundings::{Occluder, Surroundings},
@@ -13,14 +10,14 @@ use bansho_base::{
 
 use super::{
     cell::{CellState, Deviation, DeviationLanes, Deviations},
+    classes::{DropClassState, DropClasses},
     gust::{GustField, GustLanes, GustState, horizontal},
     gust_cells::{GustLine, Path},
-    lattice::{CELL_SIZE, Lattice, LatticeCell},
+    lattice::{CELL_SIZE, LatticeCell},
 };
 use crate::{
-    Rain,
     lanes::smoothstep,
-    opacity_law::OpacityLaw,
+    parameters::{OpacityLaw, RainParameters},
     shutter_cameras::{MAX_DROP_RADIUS, ShutterCameras},
 };
 
@@ -32,35 +29,6 @@ const REGION_FADE: f64 = 0.2;
 /// How far beyond the region cells may be requested, m: lamps at its border have spheres of per-drop streaks around
 /// them.
 const LAMP_MARGIN: f64 = 8.0;
-
-/// The drops of one diameter during an exposure.
-#[derive(Clone, Debug)]
-pub(crate) struct DropClassState {
-    /// Index of the diameter, from the smallest.
-    pub(crate) index: usize,
-    /// Diameter D, mm.
-    pub(crate) diameter_mm: f64,
-    /// Terminal velocity v, m/s.
-    pub(crate) speed: f64,
-    /// Largest number of drops per cubic meter in the whole shot.
-    pub(crate) max_density: f64,
-    /// Fraction of these that exist now, 0 to 1.
-    pub(crate) fraction: f64,
-    /// The lattice of its cells.
-    pub(crate) lattice: Lattice,
-}
-
-impl DropClassState {
-    /// Expected number of drops in a cell now.
-    pub(crate) fn count(&self) -> f64 {
-        self.max_density * self.fraction * self.lattice.volume()
-    }
-
-    /// A random stream for `purpose` that no other diameter uses.
-    pub(crate) fn purpose(&self, purpose: Purpose) -> Purpose {
-        Purpose(purpose.0.wrapping_add(self.index as u32))
-    }
-}
 
 /// A drop at the middle of the exposure.
 #[derive(Clone, Copy, Debug)]
@@ -118,8 +86,14 @@ pub(crate) struct ShutterState {
 }
 
 impl ShutterState {
-    pub(crate) fn new(rain: &Rain, view: &View, surroundings: &Surroundings) -> Self {
-        let parameters = &rain.parameters;
+    /// The rain of these classes in the exposure of a view; its drops are random by `key`.
+    pub(crate) fn new(
+        parameters: &RainParameters,
+        key: Key,
+        classes: &DropClasses,
+        view: &View,
+        surroundings: &Surroundings,
+    ) -> Self {
         let cameras = ShutterCameras::new(view);
         let t = view.shutter.middle();
         let (wind, response) = (surroundings.wind, parameters.wind_response);
@@ -131,8 +105,8 @@ impl ShutterState {
         let ground = ground_height(&surroundings.others.occluders).unwrap_or(parameters.ground_height);
         let (eye, reach) = (cameras.middle().position, parameters.distance * (1.0 + REGION_FADE) + LAMP_MARGIN);
         Self {
-            key: rain.key,
-            classes: rain.classes(t, surroundings, ground, eye.y - reach..=eye.y + reach),
+            key,
+            classes: classes.states(parameters, t, surroundings, ground, eye.y - reach..=eye.y + reach),
             ground,
             distance: parameters.distance,
             gain: parameters.opacity_gain,
@@ -140,17 +114,16 @@ impl ShutterState {
             whole_exposure: view.shutter.duration(),
             wind: mean,
             travel: (!is_steady).then_some(travel),
-            gusts: GustField::new(wind, response, eye, radius, ground, view.shutter, rain.loop_s),
+            gusts: GustField::new(wind, response, eye, radius, ground, view.shutter, classes.loop_s),
             occluders: surroundings.others.occluders.iter().filter(|solid| !is_ground(solid)).cloned().collect(),
             cameras,
         }
     }
 
-    /// The rain during one of several equal parts of an exposure, whose streaks come to those of the whole exposure.
-    pub(crate) fn of_part(rain: &Rain, part: &View, surroundings: &Surroundings, parts: usize) -> Self {
-        let state = Self::new(rain, part, surroundings);
-        let whole_exposure = state.whole_exposure * parts as f64;
-        Self { gain: state.gain / parts as f64, whole_exposure, ..state }
+    /// The same as one of several equal parts of an exposure, whose streaks come to those of the whole exposure.
+    pub(crate) fn into_part(self, parts: usize) -> Self {
+        let whole_exposure = self.whole_exposure * parts as f64;
+        Self { gain: self.gain / parts as f64, whole_exposure, ..self }
     }
 
     /// The weight with which a drop at `distance` from the camera is drawn as a streak: 1 within the region, 0 beyond

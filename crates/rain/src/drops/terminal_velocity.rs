@@ -5,18 +5,10 @@ use bansho_base::{
     world::{air, gravity::STANDARD_GRAVITY},
 };
 
+use crate::parameters::VelocityLaw;
+
 /// Density of water rho_p, kg/m^3.
 const WATER_DENSITY: f64 = 998.2;
-
-bansho_base::choice! {
-    /// Law of the terminal velocities.
-    pub enum VelocityLaw {
-        /// Measured by Gunn and Kinzer: large drops flatten and fall at 9.2 m/s at most.
-        GunnKinzer = "gunn_kinzer",
-        /// The paper's equations (2) to (4) for a rigid sphere: 4 % too slow at 1 mm, 29 % too fast at 5 mm.
-        RigidSphere = "rigid_sphere",
-    }
-}
 
 /// Properties of the air that determine the fall of drops.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -277,7 +277,6 @@ mod tests {
     use super::*;
     use crate::{
         Rain, RainParameters,
-        drops::shutter_state::ShutterState,
         lighting::{drop_lighting::DropLighting, extinction::RainExtinction},
         tests::{view_at, wind},
     };
@@ -312,7 +311,7 @@ mod tests {
     fn sixteen_samples_at_a_time_give_what_tangents_give_one_by_one() {
         let rain = Rain::new(RainParameters::default(), "rain", 1, None).unwrap();
         let (view, calm) = (view_at(1.0, 1.0 / 60.0, [64, 36]), wind([0.0; 3], 0.0));
-        let shutter_state = ShutterState::new(&rain, &view, &Surroundings::from_wind(&calm));
+        let shutter_state = rain.shutter_state(&view, &Surroundings::from_wind(&calm));
         let extinction = RainExtinction { all: 0.02, streaks: 0.008 };
         let profile = ExtinctionProfile { shutter_state: &shutter_state, extinction };
         let eye = DVec3::new(300.0, 1.6, -200.0);
@@ -372,7 +371,7 @@ mod tests {
     fn lamps_anywhere_give_finite_light() {
         let rain = Rain::new(RainParameters::default(), "rain", 1, None).unwrap();
         let (view, calm) = (view_at(1.0, 1.0 / 60.0, [64, 36]), wind([0.0; 3], 0.0));
-        let shutter_state = ShutterState::new(&rain, &view, &Surroundings::from_wind(&calm));
+        let shutter_state = rain.shutter_state(&view, &Surroundings::from_wind(&calm));
         let extinction = RainExtinction { all: 0.02, streaks: 0.008 };
         let intervals = [Interval { start: 0.0, width: 1e4, depth: 0.0, depth_slope: 0.02 }];
         let integrator = SightLineIntegrator {

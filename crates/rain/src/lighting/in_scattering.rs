@@ -369,7 +369,6 @@ mod tests {
     use super::*;
     use crate::{
         Rain, RainParameters,
-        drops::shutter_state::ShutterState,
         tests::{lamp, view_at, wind},
     };
 
@@ -377,7 +376,7 @@ mod tests {
     fn grids(size: [usize; 2]) -> (InScattering, InScattering) {
         let rain = Rain::new(RainParameters::default(), "rain", 1, None).unwrap();
         let (view, calm) = (view_at(1.0, 1.0 / 60.0, size), wind([0.0; 3], 0.0));
-        let shutter_state = ShutterState::new(&rain, &view, &Surroundings::from_wind(&calm));
+        let shutter_state = rain.shutter_state(&view, &Surroundings::from_wind(&calm));
         let extinction = RainExtinction { all: 0.02, streaks: 0.008 };
         let intervals = [
             Interval { start: 0.0, width: 3.0, depth: 0.0, depth_slope: 0.02 },

@@ -11,3 +11,13 @@ pub(crate) mod ray_segments;
 pub(crate) mod single_scattering;
 pub(crate) mod sky;
 pub(crate) mod tiles;
+
+use in_scattering::LampScatteringCache;
+use sky::SkyLightingCache;
+
+/// Light that was computed for earlier frames of a shot. It depends on camera and lights, so that frames use it as long as these stand still.
+#[derive(Debug, Default)]
+pub(crate) struct LightCaches {
+    pub(crate) skies: SkyLightingCache,
+    pub(crate) lamp_scattering: LampScatteringCache,
+}

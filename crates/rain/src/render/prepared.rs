@@ -20,6 +20,7 @@ use crate::{
     billboards::{Billboards, stochastic_simplification::StochasticSimplification},
     drops::{shutter_state::ShutterState, size_distribution::DropSizeDistribution},
     lighting::{
+        LightCaches,
         drop_lighting::{DropLighting, PreparedLight},
         extinction::{ExtinctionEfficiency, extinction, visibility},
         single_scattering::SingleScattering,
@@ -56,24 +57,41 @@ pub(crate) struct PreparedRain<'a> {
 }
 
 impl<'a> PreparedRain<'a> {
-    pub(crate) fn new(rain: &'a Rain, view: &'a View, surroundings: &'a Surroundings) -> Self {
+    /// The rain of a view. Light that was computed for earlier frames comes from `light_caches`.
+    pub(crate) fn new(
+        rain: &'a Rain,
+        light_caches: &LightCaches,
+        view: &'a View,
+        surroundings: &'a Surroundings,
+    ) -> Self {
         let extinction = rain.extinction(view.shutter.middle());
         let lights = &surroundings.others.lights;
         let lighting = DropLighting { scattering: &rain.optics.scattering, lights, extinction: extinction.all };
-        let sky_lighting = rain.skies.for_view(&rain.optics.phase_function, view, surroundings.sky);
-        let shutter_state = ShutterState::new(rain, view, surroundings);
+        let sky_lighting = light_caches.skies.for_view(&rain.optics.phase_function, view, surroundings.sky);
+        let shutter_state = rain.shutter_state(view, surroundings);
         let mut textured = None;
         let mut streaks = Streaks::default();
         let parts = exposure_parts(view);
         if rain.parameters.method == Method::Textures {
-            textured = TexturedBillboards::new(rain, &shutter_state, lights, view, culling_radiance(rain, view));
+            textured = rain.textures.as_ref().map(|textures| {
+                let (rate, gain) = (rain.rate(view.shutter.middle()), rain.parameters.opacity_gain);
+                TexturedBillboards::new(
+                    textures,
+                    rate,
+                    gain,
+                    &shutter_state,
+                    lights,
+                    view,
+                    culling_radiance(rain, view),
+                )
+            });
         }
         if let [_] = parts[..] {
             streaks.add_part(rain, &shutter_state, &lighting, &sky_lighting.coarse, view);
         } else {
             let share = 1.0 / parts.len() as f64;
             for part in &parts {
-                let shutter_state = ShutterState::of_part(rain, part, surroundings, parts.len());
+                let shutter_state = rain.shutter_state(part, surroundings).into_part(parts.len());
                 streaks.add_part(rain, &shutter_state, &lighting, &sky_lighting.coarse, part);
             }
             streaks.drops *= share;
@@ -85,7 +103,7 @@ impl<'a> PreparedRain<'a> {
         let unlit = DropLighting { lights: &[], ..lighting };
         // The paper only dims what is far away.
         let (lighting, sky_lighting) = match rain.parameters.method {
-            Method::Textures => (&unlit, rain.skies.for_view(&rain.optics.phase_function, view, Sky::DARK)),
+            Method::Textures => (&unlit, light_caches.skies.for_view(&rain.optics.phase_function, view, Sky::DARK)),
             Method::Billboards | Method::Drops => (&lighting, sky_lighting.clone()),
         };
         let single_scattering = SingleScattering::new(
@@ -96,7 +114,7 @@ impl<'a> PreparedRain<'a> {
             extinction,
             end,
             farthest,
-            &rain.lamp_scattering,
+            &light_caches.lamp_scattering,
         );
         let metadata = metadata(rain, view, streaks.drops, streaks.billboards);
         Self {
@@ -207,7 +225,7 @@ impl<'a> FrameInputs<'a> {
             projection: self.projection(DropSelection::All),
             parameters: &self.rain.parameters.splashes,
             time: self.view.shutter.middle(),
-            loop_s: self.rain.loop_s,
+            loop_s: self.rain.classes.loop_s,
         };
         splashes.chunks()
     }

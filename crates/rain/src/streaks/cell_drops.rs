@@ -8,8 +8,9 @@ use bansho_base::math::{
 use crate::{
     drops::{
         cell::{CellState, DropStates},
+        classes::DropClassState,
         lattice::LatticeCell,
-        shutter_state::{DropClassState, ShutterState},
+        shutter_state::ShutterState,
     },
     lanes::{LaneArray, Vec3Lanes, ZERO_LANES},
 };

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use bansho_base::math;
 
-use crate::opacity_law::OpacityLaw;
+use crate::parameters::OpacityLaw;
 
 /// The paper's opacity of a streak, `2 D / v`, at most 1.
 ///

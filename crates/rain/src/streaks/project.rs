@@ -20,8 +20,9 @@ use super::{
 };
 use crate::{
     drops::{
+        classes::DropClassState,
         lattice::{CELL_SIZE, LatticeCell},
-        shutter_state::{DropClassState, ShutterState, Sphere, VisibleCell},
+        shutter_state::{ShutterState, Sphere, VisibleCell},
     },
     lanes::{LaneArray, Vec3Lanes, ZERO_LANES, smoothstep},
     lighting::{

@@ -21,7 +21,7 @@ use super::{
     project::StreakProjection,
     project_lanes::DropPaths,
 };
-use crate::{drops::shutter_state::DropClassState, lanes::ZERO_LANES, parameters::SplashParameters};
+use crate::{drops::classes::DropClassState, lanes::ZERO_LANES, parameters::SplashParameters};
 
 /// Side of a ground square, m.
 const SQUARE_SIZE: f64 = 0.5;

@@ -76,7 +76,7 @@ fn a_cell_that_has_fallen_by_its_height_holds_other_drops() {
     let surroundings = Surroundings::from_wind(&calm);
     let parameters = super::RainParameters { diameters_mm: vec![1.4], ..streaks(super::Method::Billboards, 50.0) };
     let rain = rain(parameters, 3);
-    let speed = rain.classes(0.0, &surroundings, 0.0, 0.0..=1.0)[0].speed;
+    let speed = rain.classes.states(&rain.parameters, 0.0, &surroundings, 0.0, 0.0..=1.0)[0].speed;
     let at = |t: f64| opacity(&draw(&rain, &view_at(t, 1.0 / 60.0, SIZE), &surroundings));
     let first = at(1.0);
     assert!(correlation(&first, &first, SIZE[0], 0) > 0.999);

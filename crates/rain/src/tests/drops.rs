@@ -1,5 +1,7 @@
 //! The list of drops: drawn again by a rasterizer of its own, it gives the opacity that is measured in pictures.
 
+use std::sync::Arc;
+
 use bansho_base::{
     geometry::point_cloud::Quantity,
     image::Rect,
@@ -13,7 +15,7 @@ use bansho_base::{
     world::wind::Wind,
 };
 
-use super::{Method, Rain, RainParameters, draw, opacity, rain, reference::near, streaks, view_at, wind};
+use super::{Method, Rain, RainParameters, RainRun, draw, opacity, rain, reference::near, streaks, view_at, wind};
 use crate::Raindrop;
 
 const SIZE: [usize; 2] = [320, 180];
@@ -248,7 +250,7 @@ fn every_method_lists_the_same_drops_with_any_number_of_threads_and_exports_them
     for method in [Method::Drops, Method::Billboards, Method::Textures] {
         let rain = rain(streaks(method, 20.0), 3);
         assert_eq!(one_thread.install(|| rain.drops(&view, &surroundings)), drops, "{method:?}");
-        let cloud = rain.export(&view, &surroundings).unwrap();
+        let cloud = RainRun::new(Arc::new(rain)).export(&view, &surroundings).unwrap();
         assert_eq!(cloud.len(), drops.len());
         let last = drops.len() - 1;
         assert_eq!(cloud.positions[last], drops[last].position.as_vec3().to_array());

@@ -1,23 +1,24 @@
 //! Rain in the light of lamps.
 
 use bansho_base::{
-    host::observer::Unobserved,
     image::Rect,
     math::{self, DVec3},
     phenomenon::{
-        Run,
+        Prepared,
         strip::{DepthInterval, Strip},
         surroundings::{Emitter, Light, Publication, Surroundings},
     },
 };
 
-use super::{METHODS, Method, draw, draw_part, lamp, lit, rain, streaks, view_at, wind};
+use super::{METHODS, Method, draw, draw_part, draw_with, lamp, lit, rain, streaks, view_at, wind};
 use crate::{
     RainParameters,
     lighting::{
+        LightCaches,
         drop_lighting::{DropLighting, ScatteringTable},
         drop_phase_function::DropPhaseFunction,
     },
+    render::prepared::PreparedRain,
 };
 
 const SIZE: [usize; 2] = [160, 90];
@@ -103,7 +104,8 @@ fn block_means(simplification_codes: f64) -> Vec<[f64; 2]> {
         let mut view = view_at(1.0 + 0.3 * frame as f64, 1.0 / 60.0, [320, 180]);
         view.white_luminance = Some(40.0);
         let surroundings = lit(&calm);
-        let prepared = rain.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let caches = LightCaches::default();
+        let prepared = PreparedRain::new(&rain, &caches, &view, &surroundings);
         let mut strip = Strip::default();
         strip.reset(Rect::from_size(320, 180), None, 0);
         prepared.draw(&DepthInterval::ALL, &mut strip);
@@ -187,19 +189,20 @@ fn light_of_lamps_is_scattered_once_while_nothing_changes_and_anew_when_anything
         let others = Publication { lights: vec![lamp([0.5, 2.5, -6.0], intensity)], ..Publication::default() };
         Surroundings { others, ..Surroundings::from_wind(&calm) }
     };
-    let radiance = |rain: &crate::Rain, t: f64, shift: f64, intensity: f32| {
+    let rain = rain(RainParameters::default(), 1);
+    let radiance = |caches: &LightCaches, t: f64, shift: f64, intensity: f32| {
         let mut view = view_at(t, 1.0 / 60.0, SIZE);
         view.camera.position.x += shift;
-        draw(rain, &view, &surroundings(intensity)).radiance
+        let whole = Rect::from_size(view.size[0], view.size[1]);
+        draw_with(&rain, caches, &view, &surroundings(intensity), whole, &DepthInterval::ALL).radiance
     };
-    let fresh = || rain(RainParameters::default(), 1);
-    let used = fresh();
+    let used = LightCaches::default();
     for (t, shift, intensity) in
         [(1.0, 0.0, 300.0), (2.0, 0.0, 300.0), (2.0, 0.0, 500.0), (2.0, 0.3, 300.0), (1.0, 0.0, 300.0)]
     {
         assert_eq!(
             radiance(&used, t, shift, intensity),
-            radiance(&fresh(), t, shift, intensity),
+            radiance(&LightCaches::default(), t, shift, intensity),
             "{t} {shift} {intensity}"
         );
     }

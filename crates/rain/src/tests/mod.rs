@@ -10,11 +10,10 @@ pub(crate) mod reference;
 
 use bansho_base::{
     camera::CameraParameters,
-    host::observer::Unobserved,
     image::Rect,
     parameters::{Range, animated::Animated},
     phenomenon::{
-        Run,
+        Prepared,
         strip::{AovRule, DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter, Light, Publication, Surroundings},
     },
@@ -24,7 +23,7 @@ use bansho_base::{
     },
 };
 
-use super::{Method, Rain, RainParameters};
+use super::{Method, Rain, RainParameters, RainRun, lighting::LightCaches, render::prepared::PreparedRain};
 
 pub(super) const METHODS: [Method; 2] = [Method::Billboards, Method::Drops];
 
@@ -76,7 +75,18 @@ pub(super) fn draw_part(
     rect: Rect,
     slice: &DepthInterval,
 ) -> Strip {
-    let prepared = rain.prepare(view, surroundings, &Unobserved).unwrap();
+    draw_with(rain, &LightCaches::default(), view, surroundings, rect, slice)
+}
+
+fn draw_with(
+    rain: &Rain,
+    light_caches: &LightCaches,
+    view: &View,
+    surroundings: &Surroundings,
+    rect: Rect,
+    slice: &DepthInterval,
+) -> Strip {
+    let prepared = PreparedRain::new(rain, light_caches, view, surroundings);
     let mut strip = Strip::default();
     strip.reset(rect, None, 3);
     prepared.draw(slice, &mut strip);
@@ -232,7 +242,8 @@ fn the_plate_hides_all_rain_behind_it() {
     let view = view_at(1.0, 0.02, [96, 54]);
     for method in METHODS {
         let rain = rain(RainParameters { method, ..RainParameters::default() }, 1);
-        let prepared = rain.prepare(&view, &surroundings, &Unobserved).unwrap();
+        let caches = LightCaches::default();
+        let prepared = PreparedRain::new(&rain, &caches, &view, &surroundings);
         let draw = |depth: f32| {
             let plate = vec![depth; 96];
             let mut strip = Strip::default();

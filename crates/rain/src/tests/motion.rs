@@ -124,7 +124,7 @@ fn drops_fall_faster_in_the_thin_air_of_a_scene() {
     // Measured by Gunn and Kinzer for 2 mm; in air of half the density, faster by 2^0.4 (Foote and du Toit).
     for (air, expected) in [(Air::default(), 6.49), (thin, 6.49 * 1.3195)] {
         let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&calm) };
-        let speed = rain.classes(0.0, &surroundings, 0.0, 0.0..=1.0)[0].speed;
+        let speed = rain.classes.states(&rain.parameters, 0.0, &surroundings, 0.0, 0.0..=1.0)[0].speed;
         assert!((speed / expected - 1.0).abs() < 1e-4, "{speed} {expected}");
     }
 }

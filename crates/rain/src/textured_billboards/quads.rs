@@ -16,7 +16,8 @@ use bansho_base::{
 };
 
 use super::texture_set::StreakTexture;
-use crate::{Rain, aovs::write_aovs, drops::shutter_state::ShutterState};
+use super::texture_set::TextureSet;
+use crate::{aovs::write_aovs, drops::shutter_state::ShutterState};
 
 /// Edge of a voxel and of a billboard, m.
 const VOXEL: f64 = 1.0;
@@ -176,24 +177,26 @@ fn bounds_in_panorama(center: DVec3, camera: &Camera) -> Option<[DVec2; 2]> {
 }
 
 impl<'a> TexturedBillboards<'a> {
-    /// The billboards that may be seen; those whose light is below `culling_radiance` (cd/m^2) everywhere are left out. `None` without rain.
+    /// The billboards that may be seen; those whose light is below `culling_radiance` (cd/m^2) everywhere are left out. The
+    /// textures of `set` are those of the rain rate (mm/h), with a factor `gain` of their opacity.
     pub(crate) fn new(
-        rain: &'a Rain,
+        set: &'a TextureSet,
+        rate: f64,
+        gain: f64,
         shutter_state: &ShutterState,
         lights: &[Light],
         view: &'a View,
         culling_radiance: f32,
-    ) -> Option<Self> {
+    ) -> Self {
         let t = view.shutter.middle();
-        let set = rain.textures.as_ref()?;
-        let opacity_of_code = set.opacity_of_code() * rain.parameters.opacity_gain as f32;
+        let opacity_of_code = set.opacity_of_code() * gain as f32;
         let eye = view.camera.position;
         let (distance, ground) = (shutter_state.distance, shutter_state.ground);
         let rows = ((eye.y - ground).abs() + distance).ceil().max(1.0) as i64;
         let near = eye.y - ground - distance..=eye.y - ground + distance;
         let range = |center: f64| (center - distance).floor() as i64..=(center + distance).floor() as i64;
         let mut quads = Vec::new();
-        for (class, texture) in shutter_state.classes.iter().zip(set.of_rate(rain.rate(t))) {
+        for (class, texture) in shutter_state.classes.iter().zip(set.of_rate(rate)) {
             let heights: Vec<f64> = heights(rows, class.speed, t, near.clone()).collect();
             for (x, z) in range(eye.x).flat_map(|x| range(eye.z).map(move |z| (x, z))) {
                 for height in &heights {
@@ -211,7 +214,7 @@ impl<'a> TexturedBillboards<'a> {
             }
         }
         quads.sort_by(|a, b| (a.center - eye).length_squared().total_cmp(&(b.center - eye).length_squared()));
-        Some(Self { view, quads, opacity_of_code, ground })
+        Self { view, quads, opacity_of_code, ground }
     }
 
     /// Number of billboards.

@@ -10,9 +10,7 @@ use super::{
     quads::{Quad, heights, interpolated},
 };
 use crate::{
-    Method, RainParameters,
-    drops::terminal_velocity::VelocityLaw,
-    opacity_law::OpacityLaw,
+    Method, OpacityLaw, RainParameters, VelocityLaw,
     streaks::coverage::paper_opacity,
     tests::{METHODS, draw, lamp, lit, opacity, rain, streaks, view_at, wind},
 };

@@ -149,7 +149,11 @@ impl Shot {
 
     /// Puts all simulations back to their initial states, before the preroll, and the wind to that of the scene.
     pub fn restart(&mut self) {
-        self.runs = self.context.compiled.start();
+        let loop_s = self.context.compiled.scene().loop_s;
+        // The runs of closed forms have no state, and keep what they have computed for earlier frames.
+        for run in self.runs.iter_mut().filter(|run| run.stepping.is_some()) {
+            *run = ActiveRun::start(&run.built, loop_s);
+        }
         self.has_earlier_state = false;
         self.context.wind = self.context.compiled.wind().clone();
         self.frame = None;
@@ -304,9 +308,12 @@ impl Shot {
     /// # Errors
     /// The bytes are damaged or belong to another scene. The shot is then unchanged.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
-        let mut runs = self.context.compiled.start();
-        snapshot::read(&self.context.compiled, snapshot, &mut runs)?;
-        (self.runs, self.has_earlier_state, self.frame) = (runs, false, None);
+        let mut restored = self.context.compiled.start();
+        snapshot::read(&self.context.compiled, snapshot, &mut restored)?;
+        for (run, restored) in self.runs.iter_mut().zip(restored).filter(|(run, _)| run.stepping.is_some()) {
+            *run = restored;
+        }
+        (self.has_earlier_state, self.frame) = (false, None);
         self.context.wind = self.context.compiled.wind().clone();
         Ok(())
     }

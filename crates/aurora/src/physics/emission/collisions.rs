@@ -4,33 +4,15 @@
 use bansho_base::math;
 
 use super::{
-    Emission, PHOTONS_PER_KILORAYLEIGH,
     emitter::{EMITTERS, PerEmitter, SpectralEmitter},
     excitation::DIRECT_PHOTONS,
     quenching::natural_lifetime,
 };
-use crate::physics::{
-    atmosphere::AirLevel,
-    precipitation::{deposition::column_ion_pairs, electron_track::collision_count},
-};
+use crate::physics::atmosphere::AirLevel;
 
 /// k_b, J/K, and the atomic mass unit, kg.
 const BOLTZMANN: f64 = 1.380_649e-23;
 const ATOMIC_MASS: f64 = 1.660_539e-27;
-
-impl Emission {
-    /// Column brightness per collision of a track, in kR of ion pairs per mW m^-2. Multiplied by
-    /// [`photons_per_ion_pair`](Self::photons_per_ion_pair) of the collision's level it is the light of each emitter.
-    ///
-    /// # Panics
-    ///
-    /// If the node is not in the energy grid.
-    #[must_use]
-    pub(crate) fn ion_pairs_per_collision(&self, node: usize) -> f64 {
-        let pairs = column_ion_pairs(self.deposition().monoenergetic_profile(node));
-        pairs / collision_count(node) as f64 / PHOTONS_PER_KILORAYLEIGH
-    }
-}
 
 /// Mean thermal speed of molecules with a mass in atomic units, m/s (2.26).
 #[must_use]
@@ -72,7 +54,10 @@ pub fn mean_hard_sphere_photons(air: &AirLevel, radius: f64) -> PerEmitter<f64> 
 mod tests {
     use bansho_base::math::random::{Key, Purpose};
 
-    use super::{super::PHOTONS_PER_KILORAYLEIGH, *};
+    use super::{
+        super::{Emission, PHOTONS_PER_KILORAYLEIGH},
+        *,
+    };
     use crate::physics::{
         atmosphere::{LEVELS, atmosphere},
         precipitation::{electron_track::TrackSampler, spectrum::ARC},

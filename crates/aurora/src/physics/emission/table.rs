@@ -14,7 +14,8 @@ use crate::physics::{
     atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, covers, locate_level},
     precipitation::{
         Deposition, HardSphereParameters, Spectrum,
-        deposition::AltitudeProfile,
+        deposition::{AltitudeProfile, column_ion_pairs},
+        electron_track::collision_count,
         energy_grid::{self, NODES, node_energy_ev},
         lateral_spread::SpreadByEnergy,
     },
@@ -180,6 +181,18 @@ impl Emission {
             let color = self.lines.color_per_kilorayleigh(emitter);
             std::array::from_fn(|i| sum[i] + kilorayleigh * color[i])
         })
+    }
+
+    /// Column brightness per collision of a track, in kR of ion pairs per mW m^-2. Multiplied by
+    /// [`photons_per_ion_pair`](Self::photons_per_ion_pair) of the collision's level it is the light of each emitter.
+    ///
+    /// # Panics
+    ///
+    /// If the node is not in the energy grid.
+    #[must_use]
+    pub(crate) fn ion_pairs_per_collision(&self, node: usize) -> f64 {
+        let pairs = column_ion_pairs(self.deposition().monoenergetic_profile(node));
+        pairs / collision_count(node) as f64 / PHOTONS_PER_KILORAYLEIGH
     }
 }
 

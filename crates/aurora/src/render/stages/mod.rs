@@ -18,7 +18,7 @@ pub(crate) use canvas::WHITE_LUMINANCE;
 use canvas::{Canvas, color, false_color};
 
 use crate::{
-    Aurora, AuroraStage,
+    AuroraStage,
     shapes::Shape,
     simulate::{AuroraSimulation, field::Grid2},
 };
@@ -43,12 +43,10 @@ pub(crate) struct PreparedStage {
 }
 
 impl PreparedStage {
-    /// The stage of an aurora in a view.
-    pub(crate) fn new(aurora: &Aurora, stage: AuroraStage, view: &View) -> Self {
+    /// A stage of a state in a view, in which the sheets have this shape.
+    pub(crate) fn new(simulation: &AuroraSimulation, shape: &Shape, stage: AuroraStage, view: &View) -> Self {
         let side = view.size[0].min(view.size[1]);
-        let simulation = aurora.simulation();
-        let shape = aurora.sequence().at(view.shutter.middle());
-        let canvas = draw(simulation, &shape, stage, side);
+        let canvas = draw(simulation, shape, stage, side);
         Self { canvas, corner: view.size.map(|length| (length - side) / 2), size: view.size }
     }
 }

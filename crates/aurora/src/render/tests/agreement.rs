@@ -115,10 +115,10 @@ fn collisions_lose_no_light_on_hard_sheets() {
         rendering: RenderingParameters { sampling: Sampling::SingleCollisions, ..RenderingParameters::default() },
         ..AuroraParameters::default()
     };
-    let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
+    let run = run(parameters);
     let mut cells = arc(3000);
     cells.iter_mut().for_each(|cell| cell.energy_ev *= (0.2 * FACTOR) as f32);
-    let (emission, collisions) = (aurora.simulation().emission(), aurora.collisions().unwrap());
+    let (emission, collisions) = (run.simulation().emission(), run.render_inputs().tables.collisions.as_ref().unwrap());
     let (apart, _) = beside_profile(emission, collisions, &cells, OWN_SPREAD_KM);
     assert!(apart.iter().all(|apart| *apart < 0.03), "{apart:?}");
 }

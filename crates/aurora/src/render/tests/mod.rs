@@ -3,6 +3,8 @@
 mod agreement;
 mod threads;
 
+use std::sync::Arc;
+
 use bansho_base::{
     camera::{CameraParameters, Lens},
     color,
@@ -24,7 +26,7 @@ use super::{
     prepared::{ChartBuilder, PreparedAurora},
 };
 use crate::{
-    Aurora, AuroraParameters, ParticleParameters, SpectrumShape,
+    Aurora, AuroraParameters, AuroraRun, ParticleParameters, SpectrumShape,
     physics::{
         atmosphere::{LEVELS, atmosphere, level_altitude_km},
         attenuation_by_distance::AttenuationByDistance,
@@ -290,6 +292,11 @@ fn difference(a: &[PerEmitter<f32>], b: &[PerEmitter<f32>]) -> f64 {
     apart / sum(&mut b.as_flattened().iter().map(|value| f64::from(*value)))
 }
 
+/// A run of an aurora with these parameters, at its initial state.
+fn run(parameters: AuroraParameters) -> AuroraRun {
+    AuroraRun::new(Arc::new(Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap()))
+}
+
 #[test]
 fn every_measured_line_is_there_and_named_by_its_wavelength() {
     let lines = measured_lines().map(|line| line.wavelength_nm.floor().to_string());
@@ -393,14 +400,15 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
             particles: ParticleParameters { count: 100, ..ParticleParameters::default() },
             ..AuroraParameters::default()
         };
-        let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default()).unwrap();
+        let run = run(parameters);
         for north_km in [100.0, 250.0, 640.0, 1100.0] {
             let cells = even_arc(north_km, energy_ev as f32);
             let spread_km = [6.0, 15.0];
             let of = |shares, spread_km| sources(&cells, shares, spread_km, &field);
             let sharp = [of(GREEN, 6.0), of(PROMPT, 6.0)].concat();
             let sources = Sources { sharp, soft: of(SOFT, 15.0), spread_km };
-            let charts = ChartBuilder { aurora: &aurora, field: &field, coverage: Coverage::of_view(&view, &field) };
+            let charts =
+                ChartBuilder { inputs: run.render_inputs(), field: &field, coverage: Coverage::of_view(&view, &field) };
             let charts = [charts.sharp(&sources), charts.soft(&sources)];
             let column: Vec<PerEmitter<f32>> = (0..600)
                 .map(|row| {
@@ -430,16 +438,17 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
 #[test]
 fn a_frame_leaves_its_memory_to_the_next_without_light() {
     let view = view(Lens::Perspective, [0.0, 24.0, -60.0], [160, 90]);
-    let aurora = Aurora::new(AuroraParameters::default(), "aurora", 1, None, &MemoryAssets::default()).unwrap();
-    let field = aurora.field_lines(view.camera.position);
+    let run = run(AuroraParameters::default());
+    let inputs = run.render_inputs();
+    let field = inputs.field_lines(view.camera.position);
     let coverage = Coverage::of_view(&view, &field);
     let chart = || Chart::new(&coverage, coverage.pixel, coverage.pixel);
-    let memory = &aurora.chart_memory;
+    let memory = inputs.chart_memory;
     let mut first = memory.zeros(chart());
     let address = first.light.as_ptr();
     memory.recycle(&mut first);
     for _ in 0..2 {
-        drop(PreparedAurora::new(&aurora, &view, &Unobserved).unwrap());
+        drop(PreparedAurora::new(inputs, &view, &Unobserved).unwrap());
         let mut left = memory.zeros(chart());
         assert_eq!(left.light.as_ptr(), address, "the frame used it");
         assert!(left.light.iter().flatten().all(|value| *value == 0.0));

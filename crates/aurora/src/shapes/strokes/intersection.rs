@@ -5,16 +5,7 @@ use std::collections::BTreeSet;
 
 use bansho_base::math::DVec2;
 
-use crate::shapes::{Shape, Sheet, geometry::cell_grid::CellGrid};
-
-/// A segment of a sheet, indices from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SegmentId {
-    /// The sheet.
-    pub sheet: usize,
-    /// The segment, from point `segment` to the next.
-    pub segment: usize,
-}
+use crate::shapes::{SegmentId, Shape, Sheet, geometry::cell_grid::CellGrid};
 
 #[derive(Clone, Copy)]
 struct SheetSegment {
@@ -54,6 +45,14 @@ pub fn count_crossings<S: AsRef<[DVec2]>>(sheets: &[S]) -> usize {
         true
     });
     count
+}
+
+impl Shape {
+    /// Number of crossing pairs of segments: 0 for key shapes, possibly more for in-between shapes.
+    #[must_use]
+    pub fn crossings(&self) -> usize {
+        count_crossings(&self.sheets)
+    }
 }
 
 /// Indices of sheets with proper crossings.

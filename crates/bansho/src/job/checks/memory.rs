@@ -94,7 +94,7 @@ impl BytesPerPixel {
 fn reflected(compiled: &CompiledScene, plan: &Plan, plate: f64) -> f64 {
     let Some(mirror) = compiled.phenomena().find_map(|phenomenon| phenomenon.info().mirror) else { return 0.0 };
     let view = plan.view(plan.frames().start);
-    // Rain is a closed form, whose run is the phenomenon itself.
+    // Rain is a closed form: starting a run of it computes nothing.
     let mut closed_forms = compiled.phenomena().filter(|phenomenon| phenomenon.info().stepping.is_none());
     let is_raining = closed_forms.any(|phenomenon| phenomenon.clone().start().publish(view.shutter).extinction > 0.0);
     match mirror.roughness.pixel_size(view.camera.focal_pixels, is_raining) {

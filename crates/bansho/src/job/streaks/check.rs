@@ -3,9 +3,9 @@
 use super::Streaks;
 use crate::job::error::{MAX_DROPS, StreakList, StreaksError};
 use bansho_rain::{
+    OpacityLaw,
     billboards::texture::{StreakQuantity, StreakTextureError},
     drops::size_distribution::{DropSizeDistribution, SizeBin},
-    opacity_law::OpacityLaw,
 };
 
 /// Smallest side of a texture, pixels.

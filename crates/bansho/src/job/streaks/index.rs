@@ -5,10 +5,10 @@ use std::f64::consts::PI;
 use bansho_base::image::Image;
 use bansho_media::files::provenance;
 use bansho_rain::{
+    OpacityLaw,
     billboards::texture::{FallingDrop, StreakCube},
     drops::size_distribution::{DropSizeDistribution, SizeBin},
     lighting::extinction::{ExtinctionEfficiency, extinction, visibility},
-    opacity_law::OpacityLaw,
     streaks::{coverage::paper_opacity, oscillation::mode_frequency},
 };
 use bansho_render::display::BitDepth;

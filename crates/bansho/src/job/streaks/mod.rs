@@ -16,10 +16,11 @@ use bansho_media::{
     files::overwrite_policy::{InputFiles, OverwritePolicy},
 };
 use bansho_rain::{
+    VelocityLaw,
     billboards::texture::{FallingDrop, StreakCube},
     drops::{
         size_distribution::{DropSizeDistribution, SizeBin},
-        terminal_velocity::{FallAir, TerminalVelocity, VelocityLaw, fixed_point_velocity},
+        terminal_velocity::{FallAir, TerminalVelocity, fixed_point_velocity},
     },
     lighting::drop_phase_function::DropPhaseFunction,
 };

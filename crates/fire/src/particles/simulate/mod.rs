@@ -44,44 +44,64 @@ pub(crate) mod snapshot;
 pub(crate) mod spawning;
 pub(crate) mod vectors;
 
-/// The simulation of one flame: particles, solver and constants.
-#[derive(Clone, Debug)]
-pub(crate) struct Simulation {
-    /// Shared by all runs.
-    pub(crate) constants: Arc<DerivedConstants>,
-    combustion: CombustionModel,
+/// What the simulation of a flame depends on and never changes; all of its runs share it.
+#[derive(Debug)]
+pub(crate) struct SimulationConstants {
     pub(crate) parameters: FlameParticlesParameters,
+    pub(crate) derived: DerivedConstants,
     pub(crate) turbulence: TurbulenceTile,
     pub(crate) key: Key,
+    combustion: CombustionModel,
+}
+
+impl SimulationConstants {
+    pub(crate) fn new(parameters: FlameParticlesParameters, derived: DerivedConstants, key: Key) -> Self {
+        Self {
+            combustion: CombustionModel::from(&parameters.combustion),
+            turbulence: TurbulenceTile::new(key),
+            parameters,
+            derived,
+            key,
+        }
+    }
+}
+
+/// The simulation of one flame: particles, and the solver that moves them.
+#[derive(Clone, Debug)]
+pub(crate) struct Simulation {
+    pub(crate) shared: Arc<SimulationConstants>,
     pub(crate) particles: GasParticles,
     solver: FluidSolver,
 }
 
 impl Simulation {
-    pub(crate) fn new(parameters: &FlameParticlesParameters, constants: DerivedConstants, key: Key) -> Self {
+    /// The flame before its preroll, without gas.
+    pub(crate) fn new(shared: Arc<SimulationConstants>) -> Self {
         Self {
-            combustion: CombustionModel::from(&parameters.combustion),
-            turbulence: TurbulenceTile::new(key),
-            particles: GasParticles::new(parameters.position.into()),
-            solver: FluidSolver::new(&parameters.fluid, &constants),
-            parameters: parameters.clone(),
-            constants: Arc::new(constants),
-            key,
+            particles: GasParticles::new(shared.parameters.position.into()),
+            solver: FluidSolver::new(&shared.parameters.fluid, &shared.derived),
+            shared,
         }
+    }
+
+    /// Constants derived from the parameters.
+    pub(crate) fn constants(&self) -> &DerivedConstants {
+        &self.shared.derived
     }
 
     /// Length of a step, s.
     pub(crate) fn step_s(&self) -> f64 {
-        self.parameters.step_s
+        self.shared.parameters.step_s
     }
 
     /// Advances from `time` by one step.
     pub(crate) fn step(&mut self, time: f64, surroundings: &Surroundings) {
-        match self.parameters.gas_model {
+        match self.shared.parameters.gas_model {
             GasModel::Combustion => self.step_combustion(time, surroundings),
             GasModel::Euler => {
-                let Self { constants, parameters, key, particles, solver, .. } = self;
-                EulerStep { parameters, constants, key: *key, surroundings, time }.advance(particles, solver);
+                let SimulationConstants { parameters, derived: constants, key, .. } = &*self.shared;
+                EulerStep { parameters, constants, key: *key, surroundings, time }
+                    .advance(&mut self.particles, &mut self.solver);
             }
         }
     }
@@ -91,7 +111,8 @@ impl Simulation {
     /// Pressure and advection run in sub-steps. Processes that are slow compared with sound run once, at the beginning of the step:
     /// viscosity and conduction, mixing, burning and cooling, and changes of wind and plume axes.
     fn step_combustion(&mut self, time: f64, surroundings: &Surroundings) {
-        let Self { constants, combustion, parameters, turbulence, key, particles, solver } = self;
+        let Self { shared, particles, solver } = self;
+        let SimulationConstants { parameters, derived: constants, turbulence, key, combustion } = &**shared;
         let step = StepConstants { parameters, constants, turbulence, key: *key };
         let mut forces = ExternalForces::new(step, particles, surroundings, time);
         let step_seconds = parameters.step_s as f32;
@@ -134,7 +155,7 @@ impl Simulation {
 
     /// Removes particles that have reached their maximum age, have left the domain, or are not finite.
     fn remove_expired(&mut self) {
-        let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
+        let [min, max] = self.constants().domain.map(|corner| corner.as_vec3());
         let GasParticles { position, velocity, temperature, age, max_age, .. } = &self.particles;
         let keep: Vec<bool> = (0..age.len())
             .into_par_iter()

@@ -63,9 +63,9 @@ fn all(simulation: &Simulation) -> Vec<Particle> {
 
 /// Positions and velocities after the paper's step, by eqs. (2), (3), (11), (12) and (8) as printed.
 fn reference_step(simulation: &Simulation, particles: &[Particle]) -> Vec<[[f64; 3]; 2]> {
-    let d = f64::from(simulation.constants.support_radius);
-    let (poly6, rho_0) = (315.0 / (64.0 * std::f64::consts::PI), f64::from(simulation.constants.rest_density));
-    let k = f64::from(simulation.constants.stiffness_per_kelvin) * 1900.0;
+    let d = f64::from(simulation.constants().support_radius);
+    let (poly6, rho_0) = (315.0 / (64.0 * std::f64::consts::PI), f64::from(simulation.constants().rest_density));
+    let k = f64::from(simulation.constants().stiffness_per_kelvin) * 1900.0;
     let offset = |i: usize, j: usize| {
         [0, 1, 2].map(|c| f64::from(particles[i].position[c]) - f64::from(particles[j].position[c]))
     };
@@ -104,9 +104,9 @@ fn a_step_is_the_papers_equations_summed_over_all_pairs() {
         if t > 0.0 {
             // What was added in this step is where it was before the step, at its initial velocity.
             let added = after.iter().filter(|particle| !before.iter().any(|old| old.id == particle.id));
-            let burner = &simulation.constants.burners[0];
+            let burner = &simulation.constants().burners[0];
             let added = added.map(|particle| {
-                let spawn_point = burner.spawn_point(simulation.key, particle.id, 0.0);
+                let spawn_point = burner.spawn_point(simulation.shared.key, particle.id, 0.0);
                 let velocity = [0.0, burner.speed as f32, 0.0];
                 Particle { position: spawn_point.position.as_vec3().to_array(), velocity, ..*particle }
             });
@@ -135,7 +135,7 @@ fn a_step_is_the_papers_equations_summed_over_all_pairs() {
 fn the_same_number_is_added_in_each_step_and_the_oldest_are_removed() {
     let mut simulation = simulation(&paper());
     let mut newest = 0;
-    let speed = simulation.constants.burners[0].speed as f32;
+    let speed = simulation.constants().burners[0].speed as f32;
     World::default().run(&mut simulation, 1.0, |simulation, t| {
         let particles = all(simulation);
         let (first, last) = (particles[0].id, particles[particles.len() - 1].id);
@@ -145,7 +145,7 @@ fn the_same_number_is_added_in_each_step_and_the_oldest_are_removed() {
         assert_eq!(last + 1 - first, particles.len() as u64);
         assert_eq!(particles.len() as u64, newest.min(400));
         let same = |particle: &Particle| {
-            (particle.temperature, particle.mass, particle.fuel) == (1900.0, simulation.constants.mass, 1.0)
+            (particle.temperature, particle.mass, particle.fuel) == (1900.0, simulation.constants().mass, 1.0)
         };
         assert!(particles.iter().all(same));
         // Those of this step have moved by little else than their initial speed.
@@ -167,8 +167,9 @@ fn the_wind_is_a_force_per_volume_and_is_divided_by_the_density() {
     world().run_steps(&mut simulation, 0, 3, |simulation, _| {
         let [particle] = all(simulation)[..] else { panic!("one particle is alive") };
         // Alone it has the density m W(0) of itself.
-        let d = f64::from(simulation.constants.support_radius);
-        let density = f64::from(simulation.constants.mass) * 315.0 / (64.0 * std::f64::consts::PI * math::pow(d, 3.0));
+        let d = f64::from(simulation.constants().support_radius);
+        let density =
+            f64::from(simulation.constants().mass) * 315.0 / (64.0 * std::f64::consts::PI * math::pow(d, 3.0));
         for c in [0, 2] {
             let expected = WIND[c] / density * STEP;
             assert!((f64::from(particle.velocity[c]) / expected - 1.0).abs() < 1e-5, "{particle:?}");

@@ -119,7 +119,7 @@ fn gas_is_spawned_where_a_moving_burner_is_and_stays_behind_it() {
     assert!(spawned > 1000);
     let behind = lit(&simulation).iter().map(|index| position(&simulation, *index).x).fold(f32::INFINITY, f32::min);
     assert!(behind < 0.5, "what it left burns on where it was left: {behind}");
-    let [low, high] = simulation.constants.domain;
+    let [low, high] = simulation.constants().domain;
     assert!(low.x < -2.0 && high.x > 2.0, "there is room at both ends of its way");
 }
 
@@ -203,7 +203,7 @@ fn smoke_is_the_soot_that_leaves_the_flame_and_cools_above_it() {
 
 /// Gas that the eye sees as one: groups of lit particles closer than the support radius, as lists of their places.
 fn bodies(simulation: &Simulation) -> Vec<Vec<Vec3>> {
-    let reach = simulation.constants.support_radius;
+    let reach = simulation.constants().support_radius;
     let mut left: Vec<Vec3> = lit(simulation).into_iter().map(|index| position(simulation, index)).collect();
     let mut bodies = Vec::new();
     while let Some(first) = left.pop() {

@@ -66,15 +66,15 @@ fn center(simulation: &Simulation) -> DVec3 {
 #[test]
 fn a_free_cloud_keeps_its_momentum_and_its_center_goes_straight() {
     let mut simulation = simulation(&quiet());
-    let d = simulation.constants.support_radius;
+    let d = simulation.constants().support_radius;
     for id in 0..400 {
         let words = Key::new(2, "cloud").words(id, 0, bansho_base::math::random::Purpose(0)).map(uniform);
         let position = [words[0], words[1], words[2]].map(|u| (u - 0.5) * 3.0 * d);
         let velocity = [0.3 + words[3] - words[0], words[1] - words[2], words[0] * words[3] - 0.2];
-        simulation.particles.push(particle(&simulation.constants, id, position, velocity));
+        simulation.particles.push(particle(simulation.constants(), id, position, velocity));
     }
     let (before, size) = momentum(&simulation);
-    let (start, mean) = (center(&simulation), before / (400.0 * f64::from(simulation.constants.mass)));
+    let (start, mean) = (center(&simulation), before / (400.0 * f64::from(simulation.constants().mass)));
     World::default().run_steps(&mut simulation, 0, 1000, |simulation, t| {
         let off = (center(simulation) - start - mean * t).length();
         assert!(off < 1e-5 * (1.0 + mean.length() * t), "center {off} m off its line after {t} s");
@@ -89,10 +89,10 @@ fn a_lattice_at_rest_stays_at_rest() {
     parameters.fluid.support_radius = 2.6;
     parameters.fluid.rest_density = 1.0;
     let mut simulation = simulation(&parameters);
-    let spacing = simulation.constants.support_radius / 2.6;
+    let spacing = simulation.constants().support_radius / 2.6;
     let start = |id: u64| [id % 9, id / 9 % 9, id / 81].map(|step| step as f32 * spacing);
     for id in 0..729 {
-        simulation.particles.push(particle(&simulation.constants, id, start(id), [0.0; 3]));
+        simulation.particles.push(particle(simulation.constants(), id, start(id), [0.0; 3]));
     }
     World::default().run_steps(&mut simulation, 0, 1000, |_, _| {});
     for index in 0..729 {
@@ -106,11 +106,11 @@ fn eddies_at_a_wall_give_the_gas_no_speed_of_its_own() {
     let mut parameters = quiet();
     parameters.forces = ForceParameters { turbulence: 2.0, wind_model: WindForce::BodyForce, ..parameters.forces };
     let mut simulation = simulation(&parameters);
-    let d = simulation.constants.support_radius;
+    let d = simulation.constants().support_radius;
     for id in 0..100 {
         // Too far from each other to meet.
         let position = [3.0 * d * (id % 10) as f32, 0.5 * d, 3.0 * d * (id / 10) as f32];
-        simulation.particles.push(particle(&simulation.constants, id, position, [0.3, -1.0, 0.2]));
+        simulation.particles.push(particle(simulation.constants(), id, position, [0.3, -1.0, 0.2]));
     }
     let floor = Occluder::HalfSpace { point: DVec3::ZERO, normal: DVec3::Y };
     World { occluders: vec![floor], ..World::default() }.run_steps(&mut simulation, 0, 300, |simulation, _| {
@@ -131,16 +131,16 @@ fn a_lattice_has_its_density_and_its_middle_rests_until_sound_arrives() {
     // Under pressure everywhere: what rests is pushed alike from all sides.
     parameters.fluid.rest_density = 0.9;
     let mut simulation = simulation(&parameters);
-    let spacing = simulation.constants.support_radius / 2.6;
+    let spacing = simulation.constants().support_radius / 2.6;
     let (side, steps) = (20_u64, 8);
     let start = |id: u64| [id % side, id / side % side, id / (side * side)].map(|step| step as f32);
     for id in 0..side * side * side {
         let position = start(id).map(|step| step * spacing);
-        simulation.particles.push(particle(&simulation.constants, id, position, [0.0; 3]));
+        simulation.particles.push(particle(simulation.constants(), id, position, [0.0; 3]));
     }
-    let expected = simulation.constants.mass / (spacing * spacing * spacing);
+    let expected = simulation.constants().mass / (spacing * spacing * spacing);
     World::default().run_steps(&mut simulation, 0, steps, |_, _| {});
-    let sound = (simulation.constants.stiffness_per_kelvin * 1500.0).sqrt() / spacing;
+    let sound = (simulation.constants().stiffness_per_kelvin * 1500.0).sqrt() / spacing;
     let reached = sound * steps as f32 * simulation.step_s() as f32 + 2.6;
     let (mut resting, mut given_way) = (0, 0.0_f32);
     for index in 0..simulation.particles.len() {
@@ -188,7 +188,7 @@ fn one_particle_falls_and_rises_as_buoyancy_says() {
         let mut parameters = quiet();
         parameters.forces.buoyancy = 1.0;
         let mut simulation = simulation(&parameters);
-        let mut single = particle(&simulation.constants, 0, [0.0; 3], [0.0; 3]);
+        let mut single = particle(simulation.constants(), 0, [0.0; 3], [0.0; 3]);
         single.temperature = (share * Air::default().temperature_k) as f32;
         simulation.particles.push(single);
         World::default().run_steps(&mut simulation, 0, 60, |simulation, t| {

@@ -7,6 +7,8 @@ mod fire;
 mod gas;
 mod random;
 
+use std::sync::Arc;
+
 use bansho_base::{
     host::assets::MemoryAssets,
     math::{DVec2, DVec3, Vec3, random::Key},
@@ -21,11 +23,11 @@ use super::{
     parameters::FlameParticlesParameters,
     render::{BufferPool, FadeOut, Gas},
 };
-use crate::particles::simulate::{Simulation, derived::DerivedConstants};
+use crate::particles::simulate::{Simulation, SimulationConstants, derived::DerivedConstants};
 
 fn simulation(parameters: &FlameParticlesParameters) -> Simulation {
     let constants = DerivedConstants::new(parameters, None, &MemoryAssets::default()).unwrap();
-    Simulation::new(parameters, constants, Key::new(1, "flame"))
+    Simulation::new(Arc::new(SimulationConstants::new(parameters.clone(), constants, Key::new(1, "flame"))))
 }
 
 /// What a simulation stands among.
@@ -38,7 +40,7 @@ struct World {
 impl World {
     /// Steps from the beginning of the preroll to `end`; `each` sees the simulation after every step, and the time then.
     fn run(&self, simulation: &mut Simulation, end: f64, each: impl FnMut(&Simulation, f64)) {
-        let first = -(simulation.constants.preroll / simulation.step_s()).round() as i64;
+        let first = -(simulation.constants().preroll / simulation.step_s()).round() as i64;
         self.run_steps(simulation, first, (end / simulation.step_s()).round() as i64, each);
     }
 

@@ -45,7 +45,7 @@ fn draw(seed: u64) -> Option<(FlameParticlesParameters, WindParameters)> {
 
 /// What must hold after every step, whatever the parameters say.
 fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParameters) {
-    let (particles, constants) = (&simulation.particles, &simulation.constants);
+    let (particles, constants) = (&simulation.particles, simulation.constants());
     assert!(particles.len() <= constants.max_particles, "seed {seed}: {} particles", particles.len());
     for values in particles.float_columns() {
         assert!(values.iter().all(|value| value.is_finite()), "seed {seed}: not a number");
@@ -80,7 +80,7 @@ fn check(seed: u64, simulation: &Simulation, parameters: &FlameParticlesParamete
 
 /// The speed that parameters and wind could give the gas, m/s.
 fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, wind: &WindParameters) -> f32 {
-    let (constants, motion) = (&simulation.constants, &parameters.forces);
+    let (constants, motion) = (simulation.constants(), &parameters.forces);
     let greatest = |speed: &dyn Fn(&Burner) -> f64| constants.burners.iter().map(speed).fold(0.0, f64::max);
     // On the axis at the top of the domain that a flame has by itself, with its eddies and rings.
     let rise = greatest(&|burner| burner.axis_speed(burner.bounding_radius + 3.0 * burner.height));
@@ -114,7 +114,7 @@ fn driving_speed(simulation: &Simulation, parameters: &FlameParticlesParameters,
 
 /// The speed of gas that `acceleration`, m/s^2, drives for as long as it may live, or as `far` as the domain goes.
 fn driven_speed(simulation: &Simulation, parameters: &FlameParticlesParameters, acceleration: f64, far: f64) -> f64 {
-    let constants = &simulation.constants;
+    let constants = simulation.constants();
     let max_ages =
         (0..constants.burners.len()).map(|index| constants.max_age(index, parameters.combustion.burnt_gas_lifetime_s));
     (acceleration * max_ages.fold(0.0, f64::max)).min((2.0 * acceleration * far).sqrt())
@@ -137,7 +137,7 @@ fn mean_square_speed(simulation: &Simulation) -> f32 {
 /// What stands in the way of every second flame: a ball, a turned box or a slope, near it or where it burns.
 fn obstacle(seed: u64, simulation: &Simulation) -> Option<Occluder> {
     let words = Key::new(seed, "obstacles").uniforms(0, 0, bansho_base::math::random::Purpose(0)).map(f64::from);
-    let burner = &simulation.constants.burners[0];
+    let burner = &simulation.constants().burners[0];
     let size = burner.bounding_radius + burner.height;
     let center = burner.position(0.0) + size * DVec3::new(words[0] - 0.5, words[1], words[2] - 0.5);
     match (seed % 2, (3.0 * words[3]) as u32) {
@@ -160,7 +160,7 @@ fn burn(seed: u64, parameters: &FlameParticlesParameters, wind: WindParameters) 
     let mut simulation = simulation(parameters);
     let driven = driving_speed(&simulation, parameters, &wind);
     let world = World { wind, occluders: obstacle(seed, &simulation).into_iter().collect() };
-    let first = -(simulation.constants.preroll / simulation.step_s()).round().min(200.0) as i64;
+    let first = -(simulation.constants().preroll / simulation.step_s()).round().min(200.0) as i64;
     let (mut mean, mut greatest) = (0.0_f32, 0.0_f32);
     world.run_steps(&mut simulation, first, first + STEPS, |simulation, _| {
         check(seed, simulation, parameters);

@@ -51,7 +51,7 @@ use crate::{
         terminal_velocity::TerminalVelocity,
     },
     lighting::drop_phase_function::DropPhaseFunction,
-    opacity_law::OpacityLaw,
+    parameters::OpacityLaw,
     streaks::{
         coverage::{Streak, paper_opacity},
         oscillation::Oscillation,

@@ -2,7 +2,8 @@ use bansho_base::math::random::{Key, Purpose};
 
 use super::*;
 use crate::{
-    drops::terminal_velocity::{FallAir, VelocityLaw},
+    VelocityLaw,
+    drops::terminal_velocity::FallAir,
     tests::reference::{fields, near, rows},
 };
 

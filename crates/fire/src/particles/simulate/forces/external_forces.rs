@@ -228,6 +228,8 @@ impl BurnerForces<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use bansho_base::{
         host::assets::MemoryAssets,
         math::{random::Key, simd::Lanes},
@@ -238,7 +240,10 @@ mod tests {
     };
 
     use super::*;
-    use crate::particles::{parameters::BurnerParameters, simulate::Simulation};
+    use crate::particles::{
+        parameters::BurnerParameters,
+        simulate::{Simulation, SimulationConstants},
+    };
 
     #[test]
     fn each_burner_feels_the_wind_that_blows_where_it_stands() {
@@ -249,12 +254,13 @@ mod tests {
             ..FlameParticlesParameters::default()
         };
         let constants = DerivedConstants::new(&parameters, None, &MemoryAssets::default()).unwrap();
-        let mut simulation = Simulation::new(&parameters, constants, Key::new(1, "flame"));
+        let shared = SimulationConstants::new(parameters, constants, Key::new(1, "flame"));
+        let mut simulation = Simulation::new(Arc::new(shared));
         let gusty = WindParameters { velocity: [2.0, 0.0, 0.0].into(), gust: 1.5, ..WindParameters::default() };
         let (wind, air) = (Wind::new(gusty, 3, None), Air::default());
         let surroundings = Surroundings { air: &air, ..Surroundings::from_wind(&wind) };
         (0..30).for_each(|step| simulation.step(f64::from(step) * simulation.step_s(), &surroundings));
-        let Simulation { parameters, constants, turbulence, key, .. } = &simulation;
+        let SimulationConstants { parameters, derived: constants, turbulence, key, .. } = &*simulation.shared;
         let step = StepConstants { parameters, constants, turbulence, key: *key };
         let forces = ExternalForces::new(step, &simulation.particles, &surroundings, 0.25);
         let at = |burner: usize, position: Vec3| {
