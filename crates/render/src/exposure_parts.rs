@@ -46,28 +46,46 @@ impl PartCount {
         }
         Self { count: run.parts_when_composited(view, surroundings).min(MAX_PARTS), blurs_itself: true }
     }
-
-    fn moves(&self) -> bool {
-        self.count > 1
-    }
 }
 
-/// Raises the numbers of parts so that parts of one phenomenon begin and end with parts of the others: each becomes the largest number, or a half, a quarter or
-/// an eighth of it. What moves alone keeps its number, and is not drawn in parts if it blurs itself.
+/// Changes the numbers of parts as little as possible so that parts of one phenomenon begin and end with parts of the others: each becomes the largest number,
+/// or a half, a quarter or an eighth of it. What moves alone keeps its number, and is not drawn in parts if it blurs itself.
 pub(crate) fn nest(counts: &mut [PartCount]) {
-    const MAX_HALVINGS: u32 = 3;
-    if counts.iter().filter(|parts| parts.moves()).count() < 2 {
-        counts.iter_mut().filter(|parts| parts.blurs_itself).for_each(|parts| parts.count = 1);
+    let mut moving: Vec<&mut PartCount> = counts.iter_mut().filter(|parts| parts.count > 1).collect();
+    if moving.len() < 2 {
+        moving.iter_mut().filter(|parts| parts.blurs_itself).for_each(|parts| parts.count = 1);
         return;
     }
-    let largest = counts.iter().map(|parts| parts.count).max().unwrap_or(1);
-    let halvings = |count: usize| (largest / count).ilog2().min(MAX_HALVINGS);
-    let most = counts.iter().filter(|parts| parts.moves()).map(|parts| halvings(parts.count)).max().unwrap_or(0);
+    let wanted: Vec<usize> = moving.iter().map(|parts| parts.count).collect();
+    // In an order that does not depend on that of the scene's tables, for the rounding of the sum.
+    let mut sorted = wanted.clone();
+    sorted.sort_unstable();
+    let largest = sorted[sorted.len() - 1];
+    let candidates = (1..=largest).filter(|total| is_enough(*total, largest));
+    let best = candidates.min_by(|a, b| change(&sorted, *a).total_cmp(&change(&sorted, *b))).unwrap_or(largest);
+    moving.iter_mut().zip(nested(&wanted, best)).for_each(|(parts, count)| parts.count = count);
+}
+
+/// How much the numbers of parts change relatively if the largest becomes `total`: the sum of squares.
+fn change(wanted: &[usize], total: usize) -> f64 {
+    let pairs = nested(wanted, total).into_iter().zip(wanted);
+    let relative = pairs.map(|(nested, wanted)| nested as f64 / *wanted as f64 - 1.0);
+    relative.map(|change| change * change).sum()
+}
+
+/// Whether a number of parts may replace a wanted one: what moves by a pixel in each of these may move by a pixel and a half.
+fn is_enough(count: usize, wanted: usize) -> bool {
+    10 * count >= 7 * wanted
+}
+
+/// Numbers of parts near to the wanted ones, of which the largest is at least `total`: halves, quarters or eighths of the same number.
+fn nested(wanted: &[usize], total: usize) -> Vec<usize> {
+    const MAX_HALVINGS: u32 = 3;
+    let halvings = |wanted: usize| (0..=MAX_HALVINGS).rev().find(|halvings| is_enough(total >> halvings, wanted));
+    let each: Vec<u32> = wanted.iter().map(|wanted| halvings(*wanted).unwrap_or(0)).collect();
     // MAX_PARTS is a multiple of every unit, so it remains the limit.
-    let total = largest.next_multiple_of(1 << most);
-    for parts in counts.iter_mut().filter(|parts| parts.moves()) {
-        parts.count = total >> halvings(parts.count);
-    }
+    let total = total.next_multiple_of(1 << each.iter().copied().max().unwrap_or(0));
+    each.into_iter().map(|halvings| total >> halvings).collect()
 }
 
 /// The parts of an exposure in which a phenomenon is drawn, and how.
@@ -229,7 +247,7 @@ impl Prepared for PreparedParts<'_> {
 mod tests {
     use super::*;
 
-    fn nested(counts: &[usize]) -> Vec<usize> {
+    fn nested_counts(counts: &[usize]) -> Vec<usize> {
         let mut counts: Vec<PartCount> = counts.iter().map(|&count| PartCount { count, blurs_itself: false }).collect();
         nest(&mut counts);
         counts.iter().map(|parts| parts.count).collect()
@@ -237,15 +255,16 @@ mod tests {
 
     #[test]
     fn parts_of_several_things_begin_together() {
-        assert_eq!(nested(&[1, 22, 1]), [1, 22, 1], "what moves alone keeps its number");
-        assert_eq!(nested(&[22, 25, 32]), [32; 3]);
-        assert_eq!(nested(&[22, 1, 11]), [22, 1, 11]);
-        assert_eq!(nested(&[23, 10]), [24, 12]);
-        assert_eq!(nested(&[23, 2, 7, 1]), [24, 3, 12, 1]);
+        assert_eq!(nested_counts(&[1, 22, 1]), [1, 22, 1], "what moves alone keeps its number");
+        assert_eq!(nested_counts(&[32, 23, 23, 23, 23]), [24; 5]);
+        assert_eq!(nested_counts(&[22, 1, 11]), [22, 1, 11]);
+        assert_eq!(nested_counts(&[23, 10]), [22, 11]);
+        assert_eq!(nested_counts(&[23, 2, 7, 1]), [24, 3, 6, 1]);
         for largest in 2..=MAX_PARTS {
             for other in 2..=largest {
-                let [a, b] = nested(&[largest, other])[..] else { panic!() };
-                assert!(a >= largest && b >= other && a <= MAX_PARTS && a % b == 0, "{largest} {other}: {a} {b}");
+                let [a, b] = nested_counts(&[largest, other])[..] else { panic!() };
+                let is_nested = a <= MAX_PARTS && a % b == 0 && is_enough(a, largest) && is_enough(b, other);
+                assert!(is_nested, "{largest} {other}: {a} {b}");
             }
         }
     }

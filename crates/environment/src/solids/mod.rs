@@ -23,7 +23,8 @@
 //! [`Solids`] holds the obstacles, with a bounding volume hierarchy for each mesh. For a frame, `trace` places them at several times while the shutter is
 //! open (`pose`), and finds for each pixel what it shows: where the corners of a pixel show one smooth surface, one ray, else sixteen. `shade` computes
 //! the radiance. The drawn pixels are copied to the strips. Their depth hides all other phenomena, and where a pixel is covered partly, the renderer mixes in the
-//! scene without them ([`OpaqueSurfaces`](bansho_base::phenomenon::OpaqueSurfaces)).
+//! scene without them ([`OpaqueSurfaces`](bansho_base::phenomenon::OpaqueSurfaces)). Where other things move over the same pixels, the renderer draws them at
+//! many moments of the exposure (`trace::UntracedSolids`).
 
 mod bvh;
 mod intersect;

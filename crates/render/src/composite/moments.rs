@@ -197,12 +197,12 @@ impl Composition<'_> {
             accumulators.resize_with(accumulators.len().max(count), Accumulator::default);
         }
         let covered = &mut moments[..count];
-        self.draw_moments(level, rect, &members, Some(&hiding), pass, strips, covered);
-        let edges = hiding.iter().flat_map(|hiding| hiding.edges(rect));
-        let edge_hull = edges.fold(Rect::default(), |all, edge| all.union(&edge));
+        self.draw_moments(level, rect, &members, OpaqueSurfacesAre::Drawn(&hiding), pass, strips, covered);
+        let edges: Vec<Vec<Rect>> = hiding.iter().map(|hiding| hiding.edges(rect)).collect();
+        let edge_hull = hull(edges.iter().flatten());
         if !edge_hull.is_empty() {
             let uncovered = &mut uncovered[..count];
-            self.draw_moments(level, edge_hull, &members, None, pass, strips, uncovered);
+            self.draw_moments(level, edge_hull, &members, OpaqueSurfacesAre::LeftOut(&edges), pass, strips, uncovered);
             for (index, (moment, uncovered)) in covered.iter_mut().zip(uncovered).enumerate() {
                 let hiding = hiding[index * hiding.len() / count];
                 moment.mix_partly(uncovered, |x, y| hiding.coverage(x, y));
@@ -214,15 +214,14 @@ impl Composition<'_> {
         }
     }
 
-    /// Draws the slices within `rect` at each moment, into an accumulator for each. Opaque surfaces hide what is behind them in equal parts of the exposure, or
-    /// are left out.
+    /// Draws the slices within `rect` at each moment, into an accumulator for each.
     #[allow(clippy::too_many_arguments)]
     fn draw_moments(
         &self,
         level: Level,
         rect: Rect,
         members: &CellMembers,
-        hiding: Option<&[&HidingDepth]>,
+        surfaces: OpaqueSurfacesAre,
         pass: Pass,
         strips: &mut [Strip; 3],
         accumulators: &mut [Accumulator],
@@ -233,11 +232,11 @@ impl Composition<'_> {
         for slice in self.slices {
             for &member in &slice.members {
                 let whole = self.prepared[member].as_ref();
-                if pass.leaves_out(whole, member, hiding.is_some()) {
+                if pass.leaves_out(whole, member, matches!(surfaces, OpaqueSurfacesAre::Drawn(_))) {
                     continue;
                 }
                 let parts = &members.parts[member];
-                let hiding = hiding.filter(|_| !pass.hiding.is_opaque(member));
+                let hiding = surfaces.hiding().filter(|_| !pass.hiding.is_opaque(member));
                 let hiding_parts = hiding.map_or(1, |hiding| hiding.len());
                 // What has no parts, such as gas and rain, takes long to draw: once behind the smeared surfaces, which are as far away as those of each moment,
                 // and once without them.
@@ -256,25 +255,59 @@ impl Composition<'_> {
                 let pieces = parts.len().max(hiding_parts);
                 for piece in 0..pieces {
                     let hiding = hiding.map(|hiding| hiding[piece * hiding_parts / pieces]);
+                    let accumulators = &mut accumulators[moments_of(piece, pieces, count)];
                     if selects {
                         strip.select(uncovered, covered, |x, y| hiding.is_some_and(|it| it.coverage(x, y) > 0.0));
-                    } else {
-                        let prepared = parts[piece * parts.len() / pieces];
-                        let touched = prepared.bounds(&slice.interval).intersection(&rect);
+                        accumulators.iter_mut().for_each(|sum| sum.add_behind(level, strip, member, &[]));
+                        continue;
+                    }
+                    let prepared = parts[piece * parts.len() / pieces];
+                    let bounds = prepared.bounds(&slice.interval);
+                    let depth = hiding.unwrap_or(pass.hiding).depth_for(member, hiding.is_some(), pass.plate_depth);
+                    for drawn in surfaces.drawn_rects(rect, piece, pieces) {
+                        let touched = bounds.intersection(&drawn);
                         if touched.is_empty() {
                             continue;
                         }
-                        let hiding_or_plate = hiding.unwrap_or(pass.hiding);
-                        let depth = hiding_or_plate.depth_for(member, hiding.is_some(), pass.plate_depth);
                         self.draw_member(member, prepared, &slice.interval, touched, depth, 0, strip);
-                    }
-                    for accumulator in &mut accumulators[moments_of(piece, pieces, count)] {
-                        accumulator.add_behind(level, strip, member, &[]);
+                        accumulators.iter_mut().for_each(|sum| sum.add_behind(level, strip, member, &[]));
                     }
                 }
             }
         }
     }
+}
+
+/// What becomes of opaque surfaces in a pass over all moments of an exposure.
+#[derive(Clone, Copy)]
+enum OpaqueSurfacesAre<'a> {
+    /// They hide what is behind them, in equal parts of the exposure.
+    Drawn(&'a [&'a HidingDepth]),
+    /// They are left out. Only these pixels are needed in each of the equal parts of the exposure.
+    LeftOut(&'a [Vec<Rect>]),
+}
+
+impl<'a> OpaqueSurfacesAre<'a> {
+    fn hiding(self) -> Option<&'a [&'a HidingDepth]> {
+        match self {
+            Self::Drawn(hiding) => Some(hiding),
+            Self::LeftOut(_) => None,
+        }
+    }
+
+    /// The pixels of `rect` that are needed in one of `pieces` equal pieces of the exposure, without overlap.
+    fn drawn_rects(self, rect: Rect, piece: usize, pieces: usize) -> Vec<Rect> {
+        match self {
+            Self::Drawn(_) => vec![rect],
+            Self::LeftOut(edges) if edges.len() <= pieces => edges[piece * edges.len() / pieces].clone(),
+            Self::LeftOut(edges) => vec![hull(edges[moments_of(piece, pieces, edges.len())].iter().flatten())],
+        }
+    }
+}
+
+/// The smallest rectangle that contains others.
+fn hull<'a>(rects: impl Iterator<Item = &'a Rect>) -> Rect {
+    rects.fold(Rect::default(), |all, rect| all.union(rect))
 }
 
 #[cfg(test)]
