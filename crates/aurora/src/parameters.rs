@@ -105,6 +105,7 @@ bansho_base::parameters! {
         /// Correlation time of the noise.
         noise_correlation_time_s: f64 = 1.5, limits(Range::new(0.01, 1e5)), unit("s");
     }
+    paper: solver, charge, sweeps, tolerance;
 }
 
 bansho_base::parameters! {
@@ -186,6 +187,7 @@ bansho_base::parameters! {
         /// Births and deaths when the shape changes.
         relocation: RelocationParameters = RelocationParameters::default();
     }
+    paper: lorentz_weight, repulsion_weight, kernel, smoothing_length_cells, neighbor_search, power_distribution, limit_energy, relocation;
 }
 
 bansho_base::parameters! {
@@ -302,6 +304,7 @@ bansho_base::parameters! {
         /// What is drawn: the light, or a map of a stage of its computation.
         stage: AuroraStage = AuroraStage::Light;
     }
+    paper: afterglow, morphing, stage;
 }
 
 impl AuroraParameters {
@@ -419,6 +422,7 @@ bansho_base::parameters! {
         /// state its value. AOVs in kilorayleigh include it.
         attenuation_per_km: f64 = 0.0, limits(Range::new(0.0, 0.1)), unit("1/km");
     }
+    paper: sampling, energy_deposition, hard_spheres, color_matching, blur_space, blur_radii, attenuation_per_km;
 }
 
 /// Checks that the color table has the lines of the emission.

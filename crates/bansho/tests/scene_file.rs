@@ -6,7 +6,7 @@ mod support;
 use bansho_base::{
     host::assets::MemoryAssets,
     math::random::{Key, Purpose, uniform},
-    parameters::{self, Kind, Value},
+    parameters::{self, Kind, PAPER_HEADING, TableDescriptor, Value},
     tables,
 };
 use bansho_render::PlanOptions;
@@ -299,6 +299,73 @@ fn a_commented_template_is_a_valid_scene_also_when_every_line_is_uncommented() {
             .map(|line| format!("{line}\n"))
             .collect();
         parse(&uncommented).unwrap_or_else(|error| panic!("{error}\n{uncommented}"));
+    }
+}
+
+/// The keys, at any depth, of the parameters of a table that are there only for a paper, and of all others: dotted, in the order of the template.
+fn keys_by_purpose(prefix: &str, table: &TableDescriptor) -> [Vec<String>; 2] {
+    let (mut for_pictures, mut for_paper) = (Vec::new(), Vec::new());
+    for parameter in &table.parameters {
+        let key = format!("{prefix}{}", parameter.key);
+        match (&parameter.kind, parameter.is_for_paper) {
+            (Kind::Table(inner), is_for_paper) => {
+                let [mut pictures, mut paper] = keys_by_purpose(&format!("{key}."), inner());
+                if is_for_paper { &mut for_paper } else { &mut for_pictures }.append(&mut pictures);
+                for_paper.append(&mut paper);
+            }
+            (_, true) => for_paper.push(key),
+            (_, false) => for_pictures.push(key),
+        }
+    }
+    [for_pictures, for_paper]
+}
+
+#[test]
+fn a_template_has_the_parameters_for_a_paper_last_below_their_heading() {
+    for kind in bansho::phenomena() {
+        let text = template::commented(kind, bansho::KINDS);
+        let (_, own) = text.split_once(&format!("\n{}\n", kind.header())).unwrap();
+        let [for_pictures, for_paper] = keys_by_purpose("", (kind.table)());
+        assert!(!for_paper.is_empty(), "{}", kind.key);
+        let (before, after) = own.split_once(&format!("\n# {PAPER_HEADING}:\n")).expect(kind.key);
+        for (keys, there, elsewhere) in [(&for_pictures, before, after), (&for_paper, after, before)] {
+            for key in keys {
+                let is_in = |text: &str| {
+                    text.lines().any(|line| line.trim_start_matches("# ").starts_with(&format!("{key} =")))
+                };
+                assert!(is_in(there) && !is_in(elsewhere), "{}: {key}", kind.key);
+            }
+        }
+    }
+}
+
+/// Whether the properties of a table, and of all tables in it, have those for a paper last.
+fn check_order_of_properties(table: &TableDescriptor, schema: &serde_json::Value) {
+    let properties = schema["properties"].as_object().unwrap();
+    let order: Vec<&String> = properties.keys().filter(|key| !["name", "enabled"].contains(&key.as_str())).collect();
+    let [for_pictures, for_paper] = table.by_purpose();
+    let expected: Vec<&str> = for_pictures.iter().chain(&for_paper).map(|parameter| parameter.key).collect();
+    // A table may have an `enabled` of its own.
+    assert_eq!(order, expected.iter().filter(|key| **key != "enabled").copied().collect::<Vec<_>>());
+    for parameter in &table.parameters {
+        let property = &properties[parameter.key];
+        let says_so = property["description"].as_str().unwrap_or_default().contains(PAPER_HEADING);
+        assert_eq!(says_so, parameter.is_for_paper, "{}", parameter.key);
+        match &parameter.kind {
+            Kind::Table(inner) => check_order_of_properties(inner(), property),
+            Kind::List { item, .. } if let Kind::Table(inner) = **item => {
+                check_order_of_properties(inner(), &property["items"]);
+            }
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn the_schema_has_the_parameters_for_a_paper_last_and_says_what_they_are() {
+    let schema = schema::schema(bansho::KINDS);
+    for kind in bansho::phenomena() {
+        check_order_of_properties((kind.table)(), &schema["properties"][kind.key]["items"]);
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bansho::{KINDS, phenomena};
 use bansho_base::{
     host::assets::MemoryAssets,
-    parameters::{Descriptor, Kind, ProblemKind, TableDescriptor, Value},
+    parameters::{Descriptor, Kind, PAPER_HEADING, ProblemKind, TableDescriptor, Value},
     tables::BuildContext,
 };
 use bansho_scene::{FORMAT, Scene};
@@ -22,6 +22,19 @@ fn the_books_page_on_the_scene_file_is_up_to_date() {
     let differs = written.lines().zip(page.lines()).find(|(written, now)| written != now);
     assert_eq!(differs, None, "run BANSHO_BLESS=1 cargo test -p bansho --test scene_reference");
     assert_eq!(written.len(), page.len());
+}
+
+#[test]
+fn the_page_has_the_parameters_for_a_paper_last_in_their_table_below_a_heading() {
+    let page = page();
+    for kind in phenomena() {
+        let (_, own) = page.split_once(&format!("\n## `{}`\n", kind.header())).unwrap();
+        let own = own.split("\n#").next().unwrap();
+        let [for_pictures, for_paper] = (kind.table)().by_purpose();
+        let (before, after) = own.split_once(PAPER_HEADING).unwrap_or((own, ""));
+        assert!(for_pictures.iter().all(|parameter| before.contains(&format!("\n| `{}` |", parameter.key))), "{own}");
+        assert!(for_paper.iter().all(|parameter| after.contains(&format!("\n| `{}` |", parameter.key))), "{own}");
+    }
 }
 
 #[test]
@@ -70,7 +83,8 @@ fn page() -> String {
         "# The scene file\n\n\
          <!-- Written by crates/bansho/tests/scene_reference.rs from the descriptors; edit those instead. -->\n\n\
          A scene begins with its format, `bansho = {FORMAT}`. Everything else may be left out and then has the default given \
-         here. How values, keys and curves are written is described in [the guide](../guide/scene-file.md).\n"
+         here. How values, keys and curves are written is described in [the guide](../guide/scene-file.md). Last in each table are the keys \
+         that are there only so that [a paper](../papers/sekiguchi.md) can be followed to the letter.\n"
     );
     for kind in KINDS {
         let common = if kind.is_phenomenon() { COMMON } else { "" };
@@ -96,8 +110,19 @@ fn section(page: &mut String, header: &str, common: &str, table: &TableDescripto
 }
 
 fn parameters(page: &mut String, common: &str, table: &TableDescriptor) {
+    let [for_pictures, for_paper] = table.by_purpose();
+    if !(for_pictures.is_empty() && common.is_empty()) {
+        rows(page, common, &for_pictures);
+    }
+    if !for_paper.is_empty() {
+        *page += &format!("\n*{PAPER_HEADING}:*\n");
+        rows(page, "", &for_paper);
+    }
+}
+
+fn rows(page: &mut String, common: &str, parameters: &[&Descriptor]) {
     *page += &format!("\n| key | allowed | default | what it is |\n|---|---|---|---|\n{common}");
-    for parameter in &table.parameters {
+    for parameter in parameters {
         let doc = format!("{}{}", one_line(&parameter.doc), choices(&parameter.kind));
         let cells = [format!("`{}`", parameter.key), allowed(parameter), default(parameter), doc];
         *page += &format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | "));
@@ -106,7 +131,7 @@ fn parameters(page: &mut String, common: &str, table: &TableDescriptor) {
 
 /// The tables within a table, each with its dotted key.
 fn tables(prefix: &str, table: &TableDescriptor, found: &mut Vec<(String, &'static TableDescriptor)>) {
-    for parameter in &table.parameters {
+    for parameter in table.by_purpose().concat() {
         let (inner, suffix) = match &parameter.kind {
             Kind::List { item, .. } => (item.as_ref(), "[]"),
             kind => (kind, ""),

@@ -87,4 +87,5 @@ bansho_base::parameters! {
         /// Splashes of drops on the ground.
         splashes: SplashParameters = SplashParameters::default();
     }
+    paper: texture_rates_mm_per_h, terminal_velocity, opacity, culling;
 }

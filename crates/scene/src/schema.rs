@@ -1,7 +1,7 @@
 //! The JSON schema of scene files, with which text editors complete keys and check values.
 
 use bansho_base::{
-    parameters::{Descriptor, Kind, TableDescriptor, Value},
+    parameters::{Descriptor, Kind, PAPER_HEADING, TableDescriptor, Value},
     tables::TableKind,
 };
 use serde_json::{Value as Json, json};
@@ -41,7 +41,8 @@ fn table(descriptor: &TableDescriptor, name: Option<Json>) -> Json {
         properties.insert("name".into(), name);
         properties.insert("enabled".into(), json!({ "type": "boolean", "default": true }));
     }
-    for parameter in &descriptor.parameters {
+    // The order in which editors offer keys.
+    for parameter in descriptor.by_purpose().concat() {
         properties.insert(parameter.key.into(), property(parameter));
     }
     json!({
@@ -71,7 +72,8 @@ fn property(parameter: &Descriptor) -> Json {
     let mut schema = kind(&parameter.kind);
     if let Some(object) = schema.as_object_mut() {
         let unit = if parameter.unit.is_empty() { String::new() } else { format!(" [{}]", parameter.unit) };
-        object.insert("description".into(), json!(format!("{}{unit}", parameter.doc)));
+        let purpose = if parameter.is_for_paper { format!(" ({PAPER_HEADING}.)") } else { String::new() };
+        object.insert("description".into(), json!(format!("{}{unit}{purpose}", parameter.doc)));
         if let Some(default) = &parameter.default {
             object.insert("default".into(), value(default));
         }

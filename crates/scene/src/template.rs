@@ -3,7 +3,7 @@
 //! draw the same picture.
 
 use bansho_base::{
-    parameters::{Descriptor, Kind, Table, TableDescriptor, Value},
+    parameters::{Descriptor, Kind, PAPER_HEADING, Table, TableDescriptor, Value},
     tables::{self, TableCount, TableKind},
 };
 
@@ -145,26 +145,37 @@ fn table(text: &mut String, header: &str, descriptor: &TableDescriptor, stated: 
     comment(text, &descriptor.doc);
     text.push_str(header);
     text.push('\n');
-    parameters(text, "", descriptor, stated);
+    let [for_pictures, for_paper] = parameters("", descriptor, stated);
+    text.push_str(&for_pictures);
+    if !for_paper.is_empty() {
+        text.push_str(&format!("\n# {PAPER_HEADING}:\n{for_paper}"));
+    }
 }
 
-fn parameters(text: &mut String, prefix: &str, descriptor: &TableDescriptor, stated: &Table) {
+/// The lines of the parameters of a table and of its inner tables, and of those that are there only for a paper, at any depth. The latter come after all
+/// others, since inner tables have no headers, where the part of one would end.
+fn parameters(prefix: &str, descriptor: &TableDescriptor, stated: &Table) -> [String; 2] {
+    let mut texts = [String::new(), String::new()];
     for parameter in &descriptor.parameters {
-        text.push('\n');
-        comment(text, &explanation(parameter));
         let key = parameter.key;
         let value = stated.get(key).map(|node| &node.value);
+        let text = &mut texts[usize::from(parameter.is_for_paper)];
+        text.push('\n');
+        comment(text, &explanation(parameter));
         match (&parameter.kind, value, &parameter.default) {
             (Kind::Table(inner), value, _) => {
                 let empty = Table::default();
                 let stated = if let Some(Value::Table(table)) = value { table } else { &empty };
-                parameters(text, &format!("{prefix}{key}."), inner(), stated);
+                let [for_pictures, for_paper] = parameters(&format!("{prefix}{key}."), inner(), stated);
+                text.push_str(&for_pictures);
+                texts[1].push_str(&for_paper);
             }
             (_, Some(value), _) => text.push_str(&format!("{prefix}{key} = {value}\n")),
             (_, None, Some(default)) => text.push_str(&format!("# {prefix}{key} = {default}\n")),
             (_, None, None) => text.push_str(&format!("# {prefix}{key} =\n")),
         }
     }
+    texts
 }
 
 fn explanation(parameter: &Descriptor) -> String {

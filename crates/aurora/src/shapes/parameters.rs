@@ -97,6 +97,7 @@ bansho_base::parameters! {
         /// Or the fraction of the sheet's length at which it opens; the middle if neither is given.
         length_fraction: Option<f64> = None, limits(Range::new(0.0, 1.0));
     }
+    paper: segment;
 }
 
 bansho_base::parameters! {
@@ -144,6 +145,7 @@ bansho_base::parameters! {
         /// Sheets of the previous shape, and points on them, with a given target instead of the one matched by position.
         link: Vec<LinkParameters> = Vec::new(), limits(Length { min: 0, max: 256, item: () });
     }
+    paper: transition_frames;
 }
 
 bansho_base::choice! {

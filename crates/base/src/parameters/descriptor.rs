@@ -16,7 +16,13 @@ pub struct Descriptor {
     pub kind: Kind,
     /// Default value; `None` for an optional parameter without one.
     pub default: Option<Value>,
+    /// Whether it is there only so that a paper can be followed to the letter: whoever makes pictures leaves it alone, and what lists parameters lists it
+    /// last, under [`PAPER_HEADING`].
+    pub is_for_paper: bool,
 }
+
+/// Heading of the parameters that are there only for a paper, wherever parameters are listed.
+pub const PAPER_HEADING: &str = "To follow the paper to the letter";
 
 impl Descriptor {
     /// Whether it may be keyframed over time.
@@ -39,6 +45,12 @@ pub struct TableDescriptor {
 }
 
 impl TableDescriptor {
+    /// The parameters in the order in which they are shown, those for a paper last, as two lists: each keeps the order of the declaration.
+    pub fn by_purpose(&self) -> [Vec<&Descriptor>; 2] {
+        let (for_paper, for_pictures) = self.parameters.iter().partition(|parameter| parameter.is_for_paper);
+        [for_pictures, for_paper]
+    }
+
     /// Paths of all assets that `table`, which this describes, refers to at any depth, in the order of the descriptors.
     pub fn asset_paths(&self, table: &Table) -> Vec<String> {
         let mut paths = Vec::new();
@@ -185,6 +197,32 @@ mod tests {
             /// Its file.
             file: Option<AssetPath> = None;
         }
+    }
+
+    crate::parameters! {
+        /// A table with parameters for a paper between others.
+        pub struct Mixed {
+            /// For a paper.
+            sweeps: i64 = 60;
+            /// For pictures.
+            brightness: f64 = 1.0;
+            /// For a paper, too.
+            tolerance: f64 = 0.0;
+            /// For pictures, too.
+            speed: f64 = 1.0;
+        }
+        paper: sweeps, tolerance;
+    }
+
+    #[test]
+    fn parameters_for_a_paper_come_last_in_their_order() {
+        let [for_pictures, for_paper] =
+            Mixed::table().by_purpose().map(|parameters| parameters.iter().map(|p| p.key).collect::<Vec<_>>());
+        assert_eq!(for_pictures, ["brightness", "speed"]);
+        assert_eq!(for_paper, ["sweeps", "tolerance"]);
+        // Random values of tests and fingerprints of frames follow the declaration.
+        let declared: Vec<&str> = Mixed::table().parameters.iter().map(|parameter| parameter.key).collect();
+        assert_eq!(declared, ["sweeps", "brightness", "tolerance", "speed"]);
     }
 
     crate::parameters! {

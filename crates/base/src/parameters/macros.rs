@@ -2,6 +2,9 @@
 
 /// Declares a table of parameters: a plain struct with its defaults, and the descriptors from which everything else is derived.
 ///
+/// A line `paper: key, key;` after the struct names the parameters that are there only so that a paper can be followed to the letter
+/// ([`Descriptor::is_for_paper`](crate::parameters::Descriptor::is_for_paper)).
+///
 /// ```
 /// bansho_base::parameters! {
 ///     /// A lamp.
@@ -10,18 +13,22 @@
 ///         power_w: f64 = 60.0, limits(bansho_base::parameters::Range::new(0.0, 1e6)), unit("W");
 ///         /// Whether it burns.
 ///         lit: bool = true;
+///         /// Filament of the paper's lamp.
+///         filament: f64 = 1.0;
 ///     }
+///     paper: filament;
 /// }
 /// use bansho_base::parameters::Parameters;
 /// assert_eq!(Lamp::table().parameters[0].key, "power_w");
 /// assert!(Lamp::default().lit);
+/// assert!(Lamp::table().parameters[2].is_for_paper);
 /// ```
 #[macro_export]
 macro_rules! parameters {
     ($(#[doc = $table_doc:literal])* pub struct $Table:ident {
         $($(#[doc = $doc:literal])* $key:ident : $type:ty = $default:expr
             $(, limits($limits:expr))? $(, unit($unit:literal))? ;)*
-    }) => {
+    } $(paper: $($paper:ident),+ ;)?) => {
         $(#[doc = $table_doc])*
         #[derive(Clone, Debug, PartialEq)]
         pub struct $Table { $(
@@ -41,6 +48,9 @@ macro_rules! parameters {
             fn table() -> &'static $crate::parameters::TableDescriptor {
                 static TABLE: std::sync::LazyLock<$crate::parameters::TableDescriptor> = std::sync::LazyLock::new(|| {
                     let defaults = $Table::default();
+                    // Names fields, so that a key that does not exist is an error of the compiler.
+                    $($(let _ = &defaults.$paper;)+)?
+                    let papers: &[&str] = &[$($(stringify!($paper)),+)?];
                     $crate::parameters::TableDescriptor {
                         doc: concat!($($table_doc, "\n"),*).trim().to_owned(),
                         parameters: vec![$($crate::parameters::Descriptor {
@@ -50,6 +60,7 @@ macro_rules! parameters {
                             kind: <$type as $crate::parameters::Parameter>::kind(
                                 &$crate::parameters!(@limits $type $(, $limits)?)),
                             default: $crate::parameters::Parameter::to_value(&defaults.$key),
+                            is_for_paper: papers.contains(&stringify!($key)),
                         }),*],
                     }
                 });

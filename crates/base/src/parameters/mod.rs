@@ -1,7 +1,8 @@
 //! Parameters and their descriptors.
 //!
 //! A phenomenon declares its parameters once, with [`parameters!`](crate::parameters!): type, default, range, unit and
-//! documentation. The parser, error locations, the schema, the book, the inspector and random scenes are all derived from that declaration.
+//! documentation. The parser, error locations, the schema, the book, the inspector and random scenes are all derived from that declaration. Parameters
+//! that are there only so that a paper can be followed to the letter are marked, and listed last.
 
 pub mod animated;
 mod descriptor;
@@ -14,7 +15,7 @@ mod sample;
 mod types;
 mod value;
 
-pub use descriptor::{Choice, Descriptor, Kind, TableDescriptor};
+pub use descriptor::{Choice, Descriptor, Kind, PAPER_HEADING, TableDescriptor};
 pub use keyed::{CurveLimits, InterpolationName, MAX_POINTS};
 pub use model_error::{ModelError, ParameterError, ParameterErrorKind};
 pub use problem::{BuildError, Problem, ProblemKind, nearest};

@@ -123,6 +123,7 @@ bansho_base::parameters! {
         /// Maximum number of sub-steps per step. Gas that would need more sub-steps is made more compressible instead.
         max_substeps: i64 = 3, limits(Range::new(1.0, 100.0));
     }
+    paper: pressure_kernel, negative_pressure;
 }
 
 bansho_base::parameters! {
@@ -147,6 +148,7 @@ bansho_base::parameters! {
         /// Size of the largest eddies, in burner diameters.
         eddy_size: f64 = 0.8, limits(Range::new(0.05, 20.0)), unit("diameters");
     }
+    paper: wind_model;
 }
 
 bansho_base::parameters! {
@@ -170,6 +172,7 @@ bansho_base::parameters! {
         /// Time for which burnt gas remains after its fuel is consumed, unless it leaves the domain.
         burnt_gas_lifetime_s: f64 = 0.35, limits(Range::new(0.0, 60.0)), unit("s");
     }
+    paper: temperature_model;
 }
 
 bansho_base::parameters! {
@@ -201,6 +204,7 @@ bansho_base::parameters! {
         /// Duration of the simulation before the shot; `"auto"` is long enough for the flame to develop fully.
         preroll_s: Auto<f64> = Auto::Auto, limits(Range::new(0.0, 600.0)), unit("s");
     }
+    paper: gas_model;
 }
 
 bansho_base::choice! {
@@ -258,6 +262,7 @@ bansho_base::parameters! {
         /// Light on other objects.
         light: GasLightParameters = GasLightParameters::default();
     }
+    paper: sprite, opacity, square_size, heat_haze_model;
 }
 
 bansho_base::parameters! {

@@ -124,6 +124,7 @@ bansho_base::parameters! {
         sharpen: Curve = curve(&[[0.0, 0.0], [0.06, 0.22], [0.16, 0.48], [0.4, 0.82], [0.7, 1.0], [1.0, 0.86]]),
             limits(CurveLimits::default());
     }
+    paper: kind, octaves;
 }
 
 bansho_base::parameters! {
@@ -152,6 +153,7 @@ bansho_base::parameters! {
         /// Luminance of the blue light at the base, as a fraction of `luminance`.
         base_blue: f64 = 0.0, limits(FRACTION);
     }
+    paper: kind, red, green, blue;
 }
 
 bansho_base::parameters! {
@@ -284,4 +286,5 @@ bansho_base::parameters! {
         /// Stage of the computation that is shown.
         stage: SheetStage = SheetStage::Flame;
     }
+    paper: stage;
 }

@@ -6,7 +6,6 @@ pub(crate) mod editor_hints;
 pub mod files;
 mod history;
 pub(crate) mod keyframes;
-mod named_files;
 pub(crate) mod phenomena;
 pub mod stages;
 #[cfg(test)]
@@ -28,7 +27,7 @@ use bansho::{
 };
 
 pub use check::{CheckReport, Checker, PlannedScene, ReportedProblem, check, plan_from_report};
-pub use named_files::{FileReference, named_files};
+pub use descriptors::{FileReference, named_files};
 pub use phenomena::{PhenomenonEntry, PhenomenonId, operations};
 
 use history::History;

@@ -1,7 +1,7 @@
 //! The inspector: every parameter of the selected table, generated from the descriptors.
 
 use bansho::{
-    base::parameters::{Descriptor, Kind, TableDescriptor, Value},
+    base::parameters::{Descriptor, Kind, PAPER_HEADING, TableDescriptor, Value},
     scene::{ValuePath, operation::Operation},
 };
 
@@ -80,13 +80,27 @@ fn table_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, descriptor: &T
     // A section that matches by its own name or description is shown as a whole.
     let all = SearchFilter(String::new());
     let filter = if filter.matches_table(descriptor) { filter } else { &all };
-    for parameter in descriptor.parameters.iter().filter(|parameter| filter.matches(parameter)) {
-        let own = path.key(parameter.key);
-        match &parameter.kind {
-            Kind::Table(inner) => section_ui(ui, session, &own, parameter.key, inner(), filter),
-            Kind::List { item, .. } => list_ui(ui, session, &own, parameter, item, filter),
-            _ => row_ui(ui, session, &own, parameter),
-        }
+    let [for_pictures, for_paper] = descriptor.by_purpose();
+    for parameter in for_pictures.into_iter().filter(|parameter| filter.matches(parameter)) {
+        parameter_ui(ui, session, path, parameter, filter);
+    }
+    let mut for_paper = for_paper.into_iter().filter(|parameter| filter.matches(parameter)).peekable();
+    if for_paper.peek().is_some() {
+        ui.add_space(6.0);
+        ui.weak(PAPER_HEADING);
+    }
+    for parameter in for_paper {
+        parameter_ui(ui, session, path, parameter, filter);
+    }
+}
+
+/// One parameter of the table at `path`.
+fn parameter_ui(ui: &mut Ui, session: &mut Session, path: &ValuePath, parameter: &Descriptor, filter: &SearchFilter) {
+    let path = path.key(parameter.key);
+    match &parameter.kind {
+        Kind::Table(inner) => section_ui(ui, session, &path, parameter.key, inner(), filter),
+        Kind::List { item, .. } => list_ui(ui, session, &path, parameter, item, filter),
+        _ => row_ui(ui, session, &path, parameter),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Editing values: sliders, keyframes, recording, curves, and the thumbnails of stages.
 
-use bansho::base::math::DVec3;
+use bansho::base::{math::DVec3, parameters::PAPER_HEADING};
 use eframe::egui::{Event, Modifiers, PointerButton, Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 
@@ -49,6 +49,21 @@ fn sliders_of_a_particle_flame_edit_its_parameters() {
     slide(&mut harness, "heat release kw", 90.0);
     assert!(text(&mut harness).contains("burners = [{ heat_release_kw = 90.0 }]"), "{}", text(&mut harness));
     assert!(harness.state_mut().session().document.error().is_none());
+}
+
+#[test]
+fn the_inspector_shows_parameters_for_a_paper_last_below_a_heading() {
+    let mut harness = window("bansho = 2\n[picture]\nsize = [32, 18]\nframes = 2\n[sky]\n[[rain]]\n");
+    let top = |harness: &Harness<'_, Studio>, label: &str| harness.get_by_label(label).rect().top();
+    let heading = top(&harness, PAPER_HEADING);
+    assert!(top(&harness, "simplification codes") < heading && top(&harness, "splashes") < heading);
+    assert!(top(&harness, "terminal velocity") > heading && top(&harness, "opacity") > heading);
+    // A search that finds none of them shows no heading.
+    harness.get_by_role_and_label(Role::TextInput, "Find").focus();
+    harness.run_steps(2);
+    harness.event(Event::Text("simplification".to_owned()));
+    harness.run_steps(3);
+    assert!(harness.query_by_label(PAPER_HEADING).is_none());
 }
 
 #[test]

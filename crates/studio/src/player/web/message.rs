@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho::Assets;
 
-use super::reply::Reply;
+use super::pending::Reply;
 use crate::{
     document::{PhenomenonId, ReportedProblem, Revision},
     player::{FrameRequest, Picture},

@@ -4,7 +4,5 @@
 pub(crate) mod message;
 #[cfg(any(test, target_arch = "wasm32"))]
 pub(crate) mod pending;
-#[cfg(any(test, target_arch = "wasm32"))]
-pub(crate) mod reply;
 #[cfg(target_arch = "wasm32")]
 pub(crate) mod worker;

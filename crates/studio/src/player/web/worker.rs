@@ -7,8 +7,7 @@ use bansho::{Assets, Plan, SceneError};
 
 use super::{
     message::PageMessage,
-    pending::{Pending, WorkerUpdate},
-    reply::{Reply, WorkerMessage},
+    pending::{Pending, Reply, WorkerMessage, WorkerUpdate},
 };
 use crate::{
     document::{CheckReport, ReportedProblem},
