@@ -4,10 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     parameters::BuildError,
-    phenomenon::{
-        Phenomenon, PhenomenonInfo, Remark, Run,
-        surroundings::{Light, OtherPhenomena},
-    },
+    phenomenon::{Phenomenon, PhenomenonInfo, Remark, Run, surroundings::OtherPhenomena},
     tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
@@ -61,8 +58,8 @@ impl Phenomenon for Rain {
     }
 
     fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
-        let dark = |light: &Light| light.intensity.iter().all(|value| *value <= 0.0);
-        let unlit = neighbors.sky.is_dark() && neighbors.lights().all(dark);
+        let unlit = neighbors.sky.is_dark()
+            && neighbors.lights().all(|light| light.intensity.iter().all(|value| *value <= 0.0));
         let message = "nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would";
         unlit.then(|| Remark { unless_lit_later: true, ..Remark::new(message) })
     }

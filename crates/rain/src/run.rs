@@ -8,7 +8,7 @@ use bansho_base::{
     phenomenon::{
         Prepared, Run,
         strip::{DepthInterval, Shutter, View},
-        surroundings::{Emitter, Light, Publication, Surroundings},
+        surroundings::{Publication, Surroundings},
     },
 };
 
@@ -40,12 +40,9 @@ impl Run for RainRun {
         const MAX_LIGHTS: usize = 8;
         const MIN_LENGTH: f64 = 0.05;
         let (near, far) = (view.camera.near, self.rain.reach(surroundings));
-        let depth = |light: &Light| match light.emitter {
-            Emitter::Directional { .. } => None,
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(view.camera.depth(position)),
-        };
-        let lights = surroundings.others.lights.iter().filter_map(depth);
-        let mut edges: Vec<f64> = lights.filter(|depth| *depth > near && *depth < far).take(MAX_LIGHTS).collect();
+        let positions = surroundings.others.lights.iter().filter_map(|light| light.emitter.position());
+        let depths = positions.map(|position| view.camera.depth(position));
+        let mut edges: Vec<f64> = depths.filter(|depth| *depth > near && *depth < far).take(MAX_LIGHTS).collect();
         edges.extend([near, far]);
         edges.sort_by(f64::total_cmp);
         edges.dedup_by(|next, last| *next - *last < MIN_LENGTH);

@@ -113,11 +113,9 @@ impl Frustum {
     /// `None` for a lens without planar sides.
     fn new(camera: &Camera, window: &Rect) -> Option<Self> {
         let [across, up, back] = [0, 1, 2].map(|axis| camera.world_from_camera.col(axis));
-        let tangent = |pixels: usize, center: f64| (pixels as f64 - center) / camera.focal_pixels;
-        let [left, right] =
-            [window.x, window.right()].map(|side| across + back * tangent(side, camera.principal_point.x));
-        let [top, bottom] =
-            [window.y, window.bottom()].map(|side| -up + back * tangent(side, camera.principal_point.y));
+        let (center, focal) = (camera.principal_point, camera.focal_pixels);
+        let [left, right] = [window.x, window.right()].map(|side| across + back * ((side as f64 - center.x) / focal));
+        let [top, bottom] = [window.y, window.bottom()].map(|side| -up + back * ((side as f64 - center.y) / focal));
         let mut planes = [[0.0; PLANE_COUNT]; 3];
         for (side, outward) in [right, -left, bottom, -top, back].map(DVec3::normalize).into_iter().enumerate() {
             (0..3).for_each(|axis| planes[axis][side] = outward[axis]);
@@ -171,9 +169,13 @@ impl ShutterCameras {
         let window =
             [[window.x, window.right()], [window.y, window.bottom()]].map(|sides| sides.map(|side| side as f32));
         let is_moving = view.camera.lens != Lens::Perspective && distinct.len() > 1;
-        let time = |step: usize| shutter.open + shutter.duration() * (step as f64 / PATH_STEPS as f64);
-        let during_exposure =
-            if is_moving { (0..=PATH_STEPS).map(|step| view.camera_at(time(step))).collect() } else { Vec::new() };
+        let mut during_exposure = Vec::new();
+        if is_moving {
+            for step in 0..=PATH_STEPS {
+                let t = shutter.open + shutter.duration() * (step as f64 / PATH_STEPS as f64);
+                during_exposure.push(view.camera_at(t));
+            }
+        }
         Self {
             cameras,
             during_exposure,
@@ -221,8 +223,7 @@ impl ShutterCameras {
     /// A range of t outside of which no point `start + t step` passes [`may_be_visible`](Self::may_be_visible); empty if its ends are reversed.
     pub(crate) fn visible_part(&self, line: [DVec3; 2], half: DVec3, radius: f64) -> [f64; 2] {
         let parts = self.frusta.iter().map(|frustum| frustum.visible_part(line, half, radius));
-        let hull = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        parts.reduce(hull).unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
+        parts.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
 }
 

@@ -124,10 +124,10 @@ impl SparkEmitter<'_> {
             ((self.now - half - sparks.lifetime_s) * rate).floor() as i64 - 1,
             ((self.now + half) * rate).ceil() as i64,
         );
-        let loop_index = |id: i64| sparks_per_loop.map_or(id, |sparks_per_loop| id.rem_euclid(sparks_per_loop)) as u64;
         let mut streaks = Vec::new();
         for id in first..=last {
-            if let Some(spark) = self.spark(loop_index(id), self.now - id as f64 / rate, rate, half) {
+            let index_in_loop = sparks_per_loop.map_or(id, |sparks_per_loop| id.rem_euclid(sparks_per_loop)) as u64;
+            if let Some(spark) = self.spark(index_in_loop, self.now - id as f64 / rate, rate, half) {
                 self.add_streaks_of(&spark, view, wind, &mut streaks);
             }
         }
@@ -137,11 +137,8 @@ impl SparkEmitter<'_> {
     /// The interval of depth of the sparks that are visible in the exposure; `None` without any.
     pub(crate) fn depths(&self, view: &View, wind: &Wind) -> Option<DepthInterval> {
         let depths = self.streaks(view, wind).into_iter().map(|streak| streak.sorting_depth);
-        let join = |all: DepthInterval, one: DepthInterval| DepthInterval {
-            near: all.near.min(one.near),
-            far: all.far.max(one.far),
-        };
-        depths.map(|depth| DepthInterval { near: depth, far: depth.next_up() }).reduce(join)
+        let intervals = depths.map(|depth| DepthInterval { near: depth, far: depth.next_up() });
+        intervals.reduce(|all, one| DepthInterval { near: all.near.min(one.near), far: all.far.max(one.far) })
     }
 
     /// Spark `id`, if it glows at most `half_exposure_s` before or after the time that is `seconds_since_due` seconds after that of its index; it starts after
@@ -152,7 +149,6 @@ impl SparkEmitter<'_> {
         let second = self.key.uniforms(id, 0, Purpose::named("spark flight")).map(f64::from);
         let age = seconds_since_due - first[0] / rate;
         let lifetime_s = sparks.lifetime_s * (0.35 + 0.65 * first[1] * first[1]);
-        let vary = |variate: f64| 1.0 + sparks.speed_variation * (2.0 * variate - 1.0);
         let glows =
             (0.0..lifetime_s).contains(&age) || (age + half_exposure_s > 0.0 && age - half_exposure_s < lifetime_s);
         let starts = glows && self.starts(id, self.now - age);
@@ -160,7 +156,7 @@ impl SparkEmitter<'_> {
             age,
             lifetime_s,
             start: DVec3::new(0.5 * (first[2] - 0.5), 0.05 + 0.35 * first[3], 0.3 * (second[3] - 0.5)),
-            speed: sparks.speed * vary(second[0]),
+            speed: sparks.speed * (1.0 + sparks.speed_variation * (2.0 * second[0] - 1.0)),
             phases: [second[1], second[2]],
             turns: 0.6 + 1.2 * second[3],
         })
@@ -187,13 +183,8 @@ impl SparkEmitter<'_> {
         let lifetime_s = self.parameters.lifetime_s;
         let rise = spark.speed * lifetime_s * -math::exp_m1(-DRAG * age / lifetime_s) / DRAG;
         let swirl = self.parameters.swirl * age / (age + 0.4 * lifetime_s);
-        let angle = |phase: f64, turns: f64| std::f64::consts::TAU * (phase + turns * age);
-        let wander = |phase: f64| {
-            math::sin(angle(phase, spark.turns)) + 0.45 * math::sin(angle(1.7 * phase, 2.7 * spark.turns))
-                - math::sin(angle(phase, 0.0))
-                - 0.45 * math::sin(angle(1.7 * phase, 0.0))
-        };
-        DVec3::new(swirl * wander(spark.phases[0]), rise, swirl * wander(spark.phases[1]))
+        let [across, toward] = spark.phases.map(|phase| swirl * wander(phase, spark.turns, age));
+        DVec3::new(across, rise, toward)
     }
 
     /// Displacement by the wind since a spark started `age` seconds before `t`, m.
@@ -250,4 +241,16 @@ impl SparkEmitter<'_> {
             streaks,
         );
     }
+}
+
+/// Sideways motion of a swirl, 0 at age 0 and within about 3: two sines, of which the second is weaker and 2.7 times as fast. `phase` is in turns, `turns` in
+/// turns per second.
+fn wander(phase: f64, turns: f64, age: f64) -> f64 {
+    sine_of_turns(phase, turns, age) + 0.45 * sine_of_turns(1.7 * phase, 2.7 * turns, age)
+        - sine_of_turns(phase, 0.0, age)
+        - 0.45 * sine_of_turns(1.7 * phase, 0.0, age)
+}
+
+fn sine_of_turns(phase: f64, turns: f64, age: f64) -> f64 {
+    math::sin(std::f64::consts::TAU * (phase + turns * age))
 }

@@ -71,18 +71,10 @@ impl SparkStreak {
         if !((max_pixel - min_pixel).max_element() < MAX_LENGTH && min_pixel.abs().max_element() < 1e9) {
             return None;
         }
-        let whole = |fraction: DVec2| [fraction.x.floor() as i64, fraction.y.floor() as i64];
+        let [min_pixel, max_pixel] =
+            [min_pixel, max_pixel].map(|pixel| pixel.to_array().map(|side| side.floor() as i64));
         let [depth, sorting_depth] = depths;
-        Some(Self {
-            from,
-            to,
-            radius,
-            radiance,
-            depth,
-            sorting_depth,
-            min_pixel: whole(min_pixel),
-            max_pixel: whole(max_pixel),
-        })
+        Some(Self { from, to, radius, radiance, depth, sorting_depth, min_pixel, max_pixel })
     }
 
     /// Sum over all pixels of coverage times solid angle: summed explicitly for small streaks, otherwise the area of a disc with soft edges times the
@@ -92,22 +84,22 @@ impl SparkStreak {
         if (self.max_pixel[0] - self.min_pixel[0] + 1) * (self.max_pixel[1] - self.min_pixel[1] + 1)
             <= MAX_SUMMED_PIXELS
         {
-            let center = |x: i64, y: i64| DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            return self
-                .pixels()
-                .map(|(x, y)| (x, y, self.coverage(x, y)))
-                .filter(|(.., coverage)| *coverage > 0.0)
-                .map(|(x, y, coverage)| coverage * camera.pixel_solid_angle(center(x, y)))
-                .sum();
+            let covered =
+                self.pixels().map(|(x, y)| (x, y, self.coverage(x, y))).filter(|(.., coverage)| *coverage > 0.0);
+            let solid_angles = covered.map(|(x, y, coverage)| {
+                coverage * camera.pixel_solid_angle(DVec2::new(x as f64 + 0.5, y as f64 + 0.5))
+            });
+            return solid_angles.sum();
         }
         const POSITIONS: usize = 8;
         // The mean over a disc, exact for quadratic functions: at four points at 1/sqrt(2) of its radius.
         let offset = 0.5 * self.radius;
         let corners = [[-offset, -offset], [offset, -offset], [-offset, offset], [offset, offset]].map(DVec2::from);
-        let position = |i: usize| self.from.lerp(self.to, (i as f64 + 0.5) / POSITIONS as f64);
-        let around =
-            |middle: DVec2| corners.map(|corner| camera.pixel_solid_angle(middle + corner)).into_iter().sum::<f64>();
-        let sum: f64 = (0..POSITIONS).map(|i| around(position(i))).sum();
+        let sums = (0..POSITIONS).map(|i| {
+            let middle = self.from.lerp(self.to, (i as f64 + 0.5) / POSITIONS as f64);
+            corners.into_iter().map(|corner| camera.pixel_solid_angle(middle + corner)).sum::<f64>()
+        });
+        let sum: f64 = sums.sum();
         self.covered_area() * sum / (POSITIONS * corners.len()) as f64
     }
 
@@ -134,21 +126,20 @@ impl SparkStreak {
             return 0.0;
         }
         // Only the discs within reach of the pixel.
-        let index = |position: f64| (position * discs / length.max(1e-12)).clamp(0.0, discs);
-        let near = index(at - reach).floor() as i64..index(at + reach).ceil() as i64;
-        let near = if discs > 1.0 { near } else { 0..1 };
-        let cover = |disc: i64| {
+        let [first, end] =
+            [at - reach, at + reach].map(|position| (position * discs / length.max(1e-12)).clamp(0.0, discs));
+        let near = if discs > 1.0 { first.floor() as i64..end.ceil() as i64 } else { 0..1 };
+        let coverages = near.map(|disc| {
             let distance = math::hypot(at - length * (disc as f64 + 0.5) / discs, beside);
             1.0 - math::smoothstep(self.radius - EDGE_SOFTNESS, self.radius + EDGE_SOFTNESS, distance)
-        };
-        near.map(cover).sum::<f64>() / discs
+        });
+        coverages.sum::<f64>() / discs
     }
 
     /// Bounding rectangle in the picture.
     pub(crate) fn bounds(&self, picture: [usize; 2]) -> Rect {
-        let clip = |value: i64, side: usize| value.clamp(0, side as i64) as usize;
-        let start = [clip(self.min_pixel[0], picture[0]), clip(self.min_pixel[1], picture[1])];
-        let end = [clip(self.max_pixel[0] + 1, picture[0]), clip(self.max_pixel[1] + 1, picture[1])];
+        let start = [0, 1].map(|axis| self.min_pixel[axis].clamp(0, picture[axis] as i64) as usize);
+        let end = [0, 1].map(|axis| (self.max_pixel[axis] + 1).clamp(0, picture[axis] as i64) as usize);
         if start[0] >= end[0] || start[1] >= end[1] {
             return Rect::default();
         }

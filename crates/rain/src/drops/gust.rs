@@ -110,11 +110,7 @@ impl<'a> NodeMotion<'a> {
     fn new(wind: &'a Wind, spacing: f64, loop_s: Option<f64>) -> Self {
         let Some(seconds) = loop_s else { return Self { wind, ratios: DVec3::ONE } };
         let travel = horizontal(wind.travel(0.0, seconds)) - DVec3::Y * (TYPICAL_FALL_SPEED * seconds);
-        let closing = |travel: f64| {
-            let cells = (travel / spacing).round();
-            if cells == 0.0 { 0.0 } else { cells * spacing / travel }
-        };
-        Self { wind, ratios: DVec3::new(closing(travel.x), closing(travel.y), closing(travel.z)) }
+        Self { wind, ratios: DVec3::from(travel.to_array().map(|travel| closing_ratio(travel, spacing))) }
     }
 
     /// Position of the node with the indices 0, m.
@@ -140,13 +136,27 @@ struct GustHistory {
     weights: Vec<[f64; 4]>,
 }
 
+/// Ratio by which a distance that nodes travel in a loop becomes a whole number of cells; 0 for less than half a cell.
+fn closing_ratio(travel: f64, spacing: f64) -> f64 {
+    let cells = (travel / spacing).round();
+    if cells == 0.0 { 0.0 } else { cells * spacing / travel }
+}
+
+/// Integrals from 0 to `y` between two samples, of which the gust is the linear interpolation at 0..=1: of the weight `weight + y / memory` times the parts of the
+/// earlier and the later sample, and of these parts alone.
+fn weights_until(y: f64, weight: f64, memory: f64) -> [f64; 4] {
+    let (square, cube) = (0.5 * y * y, y * y * y / 3.0);
+    let earlier = weight * y + (1.0 / memory - weight) * square - cube / memory;
+    [earlier, weight * square + cube / memory, y - square, square]
+}
+
 impl GustHistory {
     fn new(shutter: Shutter, loop_s: Option<f64>) -> Self {
         // A loop has a whole number of steps.
         let step = loop_s.map_or(SAMPLE_STEP_S, |seconds| seconds / (seconds / SAMPLE_STEP_S).ceil().max(1.0));
         let steps = ((GUST_MEMORY_S / step).round() as i64).max(1);
-        let last_sample = |t: f64| (t / step - 1.0).floor() as i64 + 1;
-        let samples = last_sample(shutter.open) - 1 - steps..=last_sample(shutter.close);
+        let [last_at_open, last_at_close] = [shutter.open, shutter.close].map(|t| (t / step - 1.0).floor() as i64 + 1);
+        let samples = last_at_open - 1 - steps..=last_at_close;
         let count = (samples.end() - samples.start() + 1) as usize;
         let mut history = Self { step, steps, samples, weights: vec![[0.0; 4]; count] };
         for (column, t) in [shutter.open, shutter.middle(), shutter.close].into_iter().enumerate() {
@@ -165,12 +175,8 @@ impl GustHistory {
             let weight = 1.0 - (newest - sample as f64) / memory;
             let from = (newest - memory - sample as f64).clamp(0.0, 1.0);
             let to = (newest - sample as f64).clamp(0.0, 1.0);
-            let until = |y: f64| {
-                let (square, cube) = (0.5 * y * y, y * y * y / 3.0);
-                let earlier = weight * y + (1.0 / memory - weight) * square - cube / memory;
-                [earlier, weight * square + cube / memory, y - square, square]
-            };
-            let ([low, high], index) = ([until(from), until(to)], (sample - self.samples.start()) as usize);
+            let [low, high] = [from, to].map(|y| weights_until(y, weight, memory));
+            let index = (sample - self.samples.start()) as usize;
             for side in 0..2 {
                 let weights = &mut self.weights[index + side];
                 weights[column] += self.step * (high[side] - low[side]);
@@ -318,12 +324,13 @@ impl GustField {
         let reach = DVec3::new(1.0, 0.0, 1.0) * displacement + radius;
         let low = (center - reach).max(DVec3::new(f64::NEG_INFINITY, ground - 1.0, f64::NEG_INFINITY));
         let grid = NodeGrid::new([low.min(center), center + reach], origins, spacing);
-        let node = |index: usize| {
-            grid.acts_within(index, center, radius + displacement)
-                .then(|| limited(grid.gusts(index, &samples), MAX_DISPLACEMENT_RATIO * spacing))
-        };
-        let nodes: Vec<Option<GustState>> =
-            (0..grid.count.iter().product::<usize>()).into_par_iter().map(node).collect();
+        let nodes: Vec<Option<GustState>> = (0..grid.count.iter().product::<usize>())
+            .into_par_iter()
+            .map(|index| {
+                grid.acts_within(index, center, radius + displacement)
+                    .then(|| limited(grid.gusts(index, &samples), MAX_DISPLACEMENT_RATIO * spacing))
+            })
+            .collect();
         let NodeGrid { first, count, .. } = grid;
         let mut field = Self {
             spacing,
@@ -346,24 +353,26 @@ impl GustField {
         Some(field)
     }
 
+    /// Displacement in the middle of the exposure of the node with these indices along x, y and z. `None` outside of the grid, and of nodes that do not act
+    /// within the region, which have no displacement to compare.
+    fn node_displacement(&self, nodes: &[Option<GustState>], node: [usize; 3]) -> Option<DVec2> {
+        let is_inside = (0..3).all(|axis| node[axis] < self.count[axis]);
+        is_inside.then(|| nodes[self.node_index(node)]).flatten().map(|gust| gust.displacements[1])
+    }
+
     /// The [steepness](Self::steepness) of the span of three nodes along each axis that begins with a node. The derivative of a quadratic B-spline lies between
     /// the differences of nodes beside each other.
     fn steepness_of_span(&self, nodes: &[Option<GustState>], index: usize) -> DVec2 {
-        let [columns, rows, layers] = self.count;
+        let [columns, rows, _] = self.count;
         let first = [index % columns, index / columns % rows, index / columns / rows];
-        // Nodes that do not act within the region have no displacement to compare.
-        let displacement = |steps: [usize; 3]| {
-            let [x, y, z] = std::array::from_fn(|axis| first[axis] + steps[axis]);
-            let is_inside = x < columns && y < rows && z < layers;
-            is_inside.then(|| nodes[self.node_index([x, y, z])]).flatten().map(|node| node.displacements[1])
-        };
         let mut largest = [DVec2::ZERO; 3];
         for steps in (0..27).map(|node| [node % 3, node / 3 % 3, node / 9]) {
-            let Some(here) = displacement(steps) else { continue };
+            let node = std::array::from_fn(|axis| first[axis] + steps[axis]);
+            let Some(here) = self.node_displacement(nodes, node) else { continue };
             for axis in (0..3).filter(|axis| steps[*axis] < 2) {
-                let mut next = steps;
+                let mut next = node;
                 next[axis] += 1;
-                if let Some(next) = displacement(next) {
+                if let Some(next) = self.node_displacement(nodes, next) {
                     largest[axis] = largest[axis].max((next - here).abs());
                 }
             }
@@ -442,24 +451,29 @@ impl GustField {
         let parts: [Vec<(usize, [f64; 3])>; 3] =
             std::array::from_fn(|axis| self.control_points(axis, low[axis], high[axis]));
         let mut range = [DVec2::INFINITY, DVec2::NEG_INFINITY];
-        let mut add = |value: DVec2| range = [range[0].min(value), range[1].max(value)];
         if parts.iter().map(Vec::len).product::<usize>() <= MAX_CONTROL_POINTS {
             for (z, along_z) in &parts[2] {
                 for (y, along_y) in &parts[1] {
                     for (x, along_x) in &parts[0] {
-                        add(self.weighted_displacement([*x, *y, *z], [along_x, along_y, along_z]));
+                        let displacement = self.weighted_displacement([*x, *y, *z], [along_x, along_y, along_z]);
+                        range = [range[0].min(displacement), range[1].max(displacement)];
                     }
                 }
             }
         } else {
-            let ends = |axis: usize| {
-                parts[axis].iter().map(|(low, _)| *low).min().unwrap_or(0)
-                    ..=parts[axis].iter().map(|(low, _)| *low + 2).max().unwrap_or(0)
-            };
+            // Too many control points: the nodes themselves bound the spline less tightly.
+            let [x, y, z] = parts.each_ref().map(|spans| {
+                let first = spans.iter().map(|(low, _)| *low).min().unwrap_or(0);
+                let last = spans.iter().map(|(low, _)| *low + 2).max().unwrap_or(0);
+                first..=last
+            });
             let [columns, rows, _] = self.count;
-            for z in ends(2) {
-                for y in ends(1) {
-                    ends(0).for_each(|x| add(self.nodes[(z * rows + y) * columns + x].displacements[1]));
+            for k in z {
+                for j in y.clone() {
+                    for i in x.clone() {
+                        let displacement = self.nodes[(k * rows + j) * columns + i].displacements[1];
+                        range = [range[0].min(displacement), range[1].max(displacement)];
+                    }
                 }
             }
         }
@@ -470,11 +484,12 @@ impl GustField {
     fn control_points(&self, axis: usize, low: f64, high: f64) -> Vec<(usize, [f64; 3])> {
         let [(first, from), (last, to)] = [low, high].map(|position| self.span(1, axis, position));
         let spans = first..=last;
-        let of_span = |span: usize| {
+        let mut control_points = Vec::new();
+        for span in spans {
             let (u, v) = (if span == first { from } else { 0.0 }, if span == last { to } else { 1.0 });
-            [[u, u], [u, v], [v, v]].map(|arguments| (span, blossom(arguments)))
-        };
-        spans.flat_map(of_span).collect()
+            control_points.extend([[u, u], [u, v], [v, v]].map(|arguments| (span, blossom(arguments))));
+        }
+        control_points
     }
 
     /// The first of the three nodes around a position along an axis, in units of the spacing, in the grid at one of the three times; and the position within the
@@ -551,15 +566,21 @@ pub(super) fn slopes(t: f64) -> [f64; 3] {
 /// limited by the chain rule.
 fn limited(sums: [DVec2; 4], limit: f64) -> GustState {
     let (half, [open, middle, close, velocity]) = (0.5 * limit, sums);
-    let factor = |length: f64| if length <= half { 1.0 } else { (limit - half * half / length) / length };
-    let displacements = [open, middle, close].map(|displacement| displacement * factor(displacement.length()));
+    let displacements =
+        [open, middle, close].map(|displacement| displacement * limit_factor(displacement.length(), limit));
     let length = middle.length();
     if length <= half {
         return GustState { displacements, velocity };
     }
     let slope = (2.0 * half * half / length - limit) / (length * length);
-    let velocity = velocity * factor(length) + middle * (slope * middle.dot(velocity) / length);
+    let velocity = velocity * limit_factor(length, limit) + middle * (slope * middle.dot(velocity) / length);
     GustState { displacements, velocity }
+}
+
+/// Factor by which [`limited`] shortens a displacement of a length.
+fn limit_factor(length: f64, limit: f64) -> f64 {
+    let half = 0.5 * limit;
+    if length <= half { 1.0 } else { (limit - half * half / length) / length }
 }
 
 /// The horizontal component: near the ground wind is horizontal.

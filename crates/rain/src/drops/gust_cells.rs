@@ -100,8 +100,26 @@ impl GustField {
     /// The coordinates of a path along an axis, in units of the spacing.
     #[inline(always)]
     fn coordinates(&self, axis: usize, path: Path) -> [f64; 3] {
-        let at = |time: usize| (path[time][axis] - self.origins[time][axis]) / self.spacing;
-        [at(0), at(1), at(2)]
+        let mut coordinates = [0.0; 3];
+        for time in 0..3 {
+            coordinates[time] = (path[time][axis] - self.origins[time][axis]) / self.spacing;
+        }
+        coordinates
+    }
+
+    /// Weights of the nodes along an axis for paths whose velocity relative to the nodes is `relative`, in units of the spacing.
+    #[inline(always)]
+    fn path_weights<const PATHS: usize, const BENDS: bool>(
+        &self,
+        axis: usize,
+        paths: [Path; PATHS],
+        relative: DVec3,
+    ) -> Option<AxisWeights<PATHS>> {
+        let mut coordinates = [[0.0; 3]; PATHS];
+        for index in 0..PATHS {
+            coordinates[index] = self.coordinates(axis, paths[index]);
+        }
+        self.axis_weights::<PATHS, BENDS>(axis, coordinates, relative[axis])
     }
 
     /// Gusts at the corners of a box, x fastest, then y; all of it moves with `velocity` (m/s). `None` if it is larger than a few nodes.
@@ -120,14 +138,9 @@ impl GustField {
     #[inline(always)]
     fn corners<const BENDS: bool>(&self, low: Path, high: Path, velocity: DVec3) -> Option<[GustLanes; 8]> {
         let relative = (velocity - self.node_velocity) / self.spacing;
-        let weights = |axis: usize| {
-            self.axis_weights::<2, BENDS>(
-                axis,
-                [self.coordinates(axis, low), self.coordinates(axis, high)],
-                relative[axis],
-            )
-        };
-        let [x, y, z] = [weights(0)?, weights(1)?, weights(2)?];
+        let x = self.path_weights::<2, BENDS>(0, [low, high], relative)?;
+        let y = self.path_weights::<2, BENDS>(1, [low, high], relative)?;
+        let z = self.path_weights::<2, BENDS>(2, [low, high], relative)?;
         let mut corners = [[0.0; 8]; 8];
         // First along y, then z, then x: the nodes are read once, and each sum is over what the one before has left.
         for i in 0..x.count {
@@ -163,8 +176,9 @@ impl GustField {
 
     fn point<const BENDS: bool>(&self, path: Path, velocity: DVec3) -> Option<GustLanes> {
         let relative = (velocity - self.node_velocity) / self.spacing;
-        let weights = |axis: usize| self.axis_weights::<1, BENDS>(axis, [self.coordinates(axis, path)], relative[axis]);
-        let [x, y, z] = [weights(0)?, weights(1)?, weights(2)?];
+        let x = self.path_weights::<1, BENDS>(0, [path], relative)?;
+        let y = self.path_weights::<1, BENDS>(1, [path], relative)?;
+        let z = self.path_weights::<1, BENDS>(2, [path], relative)?;
         let mut sum = [0.0; 8];
         for k in 0..z.count {
             let mut plane = [0.0; 8];
@@ -192,10 +206,11 @@ impl GustField {
 
     /// Largest differences of the displacements at a point and at points up to `distance` (m) away along each axis, m.
     pub(super) fn difference_around(&self, point: DVec3, distance: f64) -> DVec3 {
-        let span = |axis: usize, offset: f64| {
-            self.span(1, axis, (point[axis] + offset - self.origins[1][axis]) / self.spacing).0
-        };
-        let [x, y, z] = [0, 1, 2].map(|axis| span(axis, -distance)..=span(axis, distance));
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let [first, last] = [-distance, distance]
+                .map(|offset| self.span(1, axis, (point[axis] + offset - self.origins[1][axis]) / self.spacing).0);
+            first..=last
+        });
         let mut steepness = DVec2::ZERO;
         for k in z {
             for j in y.clone() {
@@ -209,12 +224,13 @@ impl GustField {
 
     fn line<const BENDS: bool>(&self, from: Path, to: Path, velocity: DVec3) -> Option<GustLine> {
         let relative = (velocity - self.node_velocity) / self.spacing;
-        let weights = |axis: usize| self.axis_weights::<1, BENDS>(axis, [self.coordinates(axis, from)], relative[axis]);
-        let [x, y] = [weights(0)?, weights(1)?];
+        let x = self.path_weights::<1, BENDS>(0, [from], relative)?;
+        let y = self.path_weights::<1, BENDS>(1, [from], relative)?;
         let [starts, ends] = [from, to].map(|path| self.coordinates(2, path));
         let first = (0..3).map(|time| self.span(time, 2, starts[time]).0).fold(usize::MAX, usize::min);
         let last = (0..3).map(|time| self.span(time, 2, ends[time]).0).fold(0, usize::max) + 2;
-        let node = |k: usize| {
+        let mut nodes = Vec::with_capacity((last + 1).saturating_sub(first));
+        for k in first..=last {
             let mut sum = [0.0; 8];
             for i in 0..x.count {
                 let mut column = [0.0; 8];
@@ -224,9 +240,9 @@ impl GustField {
                 }
                 add_weighted::<BENDS>(&mut sum, &column, x.weights[0][i]);
             }
-            sum
-        };
-        Some(GustLine { first, nodes: (first..=last).map(node).collect(), relative: relative.z, bends: BENDS })
+            nodes.push(sum);
+        }
+        Some(GustLine { first, nodes, relative: relative.z, bends: BENDS })
     }
 
     /// Gusts at a point of a line.

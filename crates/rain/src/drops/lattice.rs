@@ -67,17 +67,17 @@ impl Lattice {
             }
         };
         let base = ground - speed * t;
-        let row = |y: f64| ((y - base) / height).floor() as i64;
-        let (first, last) = (row(*heights.start()), row(*heights.end()));
+        let [first, last] = [*heights.start(), *heights.end()].map(|y| ((y - base) / height).floor() as i64);
         // Bounds the time to the ground, for drops that hardly fall.
         let slowest = speed.max(1e-6);
         let unplanned = wind.unplanned_travel(t);
-        let drift = |row: i64| {
+        let mut row_drifts = Vec::new();
+        for row in first..=last {
             let planned = wind.planned_travel((row as f64 + 0.5) * height / slowest, t);
             let drift = unplanned.map_or(planned, |unplanned| planned + unplanned) * response;
-            DVec2::new(drift.x, drift.z)
-        };
-        Self { height, base, first, drift: (first..=last).map(drift).collect(), rows }
+            row_drifts.push(DVec2::new(drift.x, drift.z));
+        }
+        Self { height, base, first, drift: row_drifts, rows }
     }
 
     /// Volume of a cell, m^3.
@@ -123,9 +123,13 @@ impl Lattice {
     pub(crate) fn contents(&self, cell: LatticeCell) -> u64 {
         let [x, y, z] = cell.0;
         let y = self.rows.map_or(y, |rows| y.rem_euclid(rows));
-        let bits = |count: i64, bits: u32| count as u64 & ((1 << bits) - 1);
-        bits(x, 21) << 43 | bits(y, 22) << 21 | bits(z, 21)
+        low_bits(x, 21) << 43 | low_bits(y, 22) << 21 | low_bits(z, 21)
     }
+}
+
+/// The lowest bits of an index in two's complement: negative indices wrap around.
+fn low_bits(index: i64, bits: u32) -> u64 {
+    index as u64 & ((1 << bits) - 1)
 }
 
 #[cfg(test)]

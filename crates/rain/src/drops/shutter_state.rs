@@ -148,18 +148,19 @@ impl ShutterState {
     #[inline(always)]
     pub(crate) fn cell_state(&self, class: &DropClassState, cell: LatticeCell) -> CellState {
         let eye = self.cameras.middle().position;
-        let corner = |step: [f64; 3]| class.lattice.point_in_world(cell, DVec3::from(step));
-        let origin = corner([0.0; 3]);
+        let lattice = &class.lattice;
+        let origin = lattice.point_in_world(cell, DVec3::ZERO);
         let [base, right, up, back] = [
             origin - eye,
-            corner([1.0, 0.0, 0.0]) - origin,
-            corner([0.0, 1.0, 0.0]) - origin,
-            corner([0.0, 0.0, 1.0]) - origin,
+            lattice.point_in_world(cell, DVec3::X) - origin,
+            lattice.point_in_world(cell, DVec3::Y) - origin,
+            lattice.point_in_world(cell, DVec3::Z) - origin,
         ]
         .map(|vector| vector.as_vec3().to_array());
         let velocity = self.steady_velocity(class);
         let deviations = if self.gusts.is_some() || self.travel.is_some() {
-            Some(Deviations::new(self.deviations_at_corners([corner([0.0; 3]), corner([1.0; 3])], velocity)))
+            let opposite = lattice.point_in_world(cell, DVec3::ONE);
+            Some(Deviations::new(self.deviations_at_corners([origin, opposite], velocity)))
         } else {
             None
         };
@@ -242,8 +243,9 @@ impl ShutterState {
     /// A drop at a point of a cell, given as fractions of its edges.
     pub(crate) fn drop_state(&self, class: &DropClassState, cell: LatticeCell, within: DVec3) -> DropState {
         let (position, velocity) = (class.lattice.point_in_world(cell, within), self.steady_velocity(class));
-        let gusts = |field: &GustField, path: Path| field.at_point(path, velocity);
-        self.deviated_drop(position, velocity, self.steady_travel(velocity), gusts)
+        self.deviated_drop(position, velocity, self.steady_travel(velocity), |field, path| {
+            field.at_point(path, velocity)
+        })
     }
 
     /// The drop that without gusts is at a `position` and has a `velocity` (m/s), in the gusts that `at` finds along its path.
@@ -283,8 +285,9 @@ impl ShutterState {
     /// The drop at the center of a cell of a line.
     fn drop_of_line(&self, class: &DropClassState, cell: LatticeCell, line: &DropLine) -> DropState {
         let position = class.lattice.point_in_world(cell, DVec3::splat(0.5));
-        let gusts = |field: &GustField, path: Path| field.at_line(line.gusts.as_ref()?, path);
-        self.deviated_drop(position, line.velocity, [line.travel, line.bends], gusts)
+        self.deviated_drop(position, line.velocity, [line.travel, line.bends], |field, path| {
+            field.at_line(line.gusts.as_ref()?, path)
+        })
     }
 
     /// Cells of a class with drops that may be visible within a sphere. Drops are drawn up to `half_width` (m) from the cell's center in x and z.
@@ -405,11 +408,11 @@ fn is_ground(solid: &Occluder) -> bool {
 
 /// Height of the highest horizontal ground plane among the solids, m.
 pub(crate) fn ground_height(occluders: &[Occluder]) -> Option<f64> {
-    let level = |occluder: &Occluder| match occluder {
+    let levels = occluders.iter().filter_map(|occluder| match occluder {
         Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
         _ => None,
-    };
-    occluders.iter().filter_map(level).max_by(f64::total_cmp)
+    });
+    levels.max_by(f64::total_cmp)
 }
 
 /// Steps of sphere tracing after which a grazing ray counts as a miss.

@@ -179,13 +179,11 @@ impl SizeTable {
 
     /// The linear segments within a range of diameters.
     fn segments(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = [[f64; 2]; 2]> {
-        let segment = move |pair: &[[f64; 2]]| {
+        self.0.windows(2).filter_map(move |pair| {
             let [[d0, n0], [d1, n1]] = [pair[0], pair[1]];
             let (from, to) = (d0.max(low), d1.min(high));
-            let at = |d: f64| [d, math::lerp(n0, n1, (d - d0) / (d1 - d0))];
-            (from < to).then(|| [at(from), at(to)])
-        };
-        self.0.windows(2).filter_map(segment)
+            (from < to).then(|| [from, to].map(|d| [d, math::lerp(n0, n1, (d - d0) / (d1 - d0))]))
+        })
     }
 
     fn density(&self, diameter_mm: f64) -> f64 {
@@ -198,16 +196,7 @@ impl SizeTable {
     }
 
     fn moment(&self, k: u32, range: [f64; 2]) -> f64 {
-        // Integral of d^k (a + b d), in closed form.
-        let power = |d: f64, exponent: u32| (0..exponent).fold(1.0, |product, _| product * d);
-        let segment_moment = |[[d0, n0], [d1, n1]]: [[f64; 2]; 2]| {
-            let slope = (n1 - n0) / (d1 - d0);
-            let antiderivative = |d: f64| {
-                (n0 - slope * d0) * power(d, k + 1) / (k + 1) as f64 + slope * power(d, k + 2) / (k + 2) as f64
-            };
-            antiderivative(d1) - antiderivative(d0)
-        };
-        self.segments(range).map(segment_moment).sum()
+        self.segments(range).map(|segment| segment_moment(segment, k)).sum()
     }
 
     fn quantile(&self, u: f64, range: [f64; 2]) -> f64 {
@@ -226,6 +215,21 @@ impl SizeTable {
     }
 }
 
+/// Integral of `d^k n(d)` over a linear segment between two points `[d, n]`, in closed form.
+fn segment_moment([[d0, n0], [d1, n1]]: [[f64; 2]; 2], k: u32) -> f64 {
+    let slope = (n1 - n0) / (d1 - d0);
+    // With n = a + slope d, the antiderivative of d^k n.
+    let [start, end] = [d0, d1].map(|d| {
+        (n0 - slope * d0) * integer_power(d, k + 1) / (k + 1) as f64 + slope * integer_power(d, k + 2) / (k + 2) as f64
+    });
+    end - start
+}
+
+/// `base^exponent`, multiplied from the left, so that its bits are the same on every system.
+fn integer_power(base: f64, exponent: u32) -> f64 {
+    (0..exponent).fold(1.0, |product, _| product * base)
+}
+
 /// A bin of diameters, represented by one of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeBin {
@@ -241,15 +245,17 @@ impl SizeBin {
 
     /// Bins around ascending diameters. Bounds are halfway between neighbors; the outer bins are symmetric.
     pub fn around(diameters_mm: &[f64]) -> Vec<Self> {
-        let gap = |index: usize| diameters_mm.get(index..index + 2).map(|pair| 0.5 * (pair[1] - pair[0]));
-        let bin = |(index, &diameter_mm): (usize, &f64)| {
-            let (below, above) = (index.checked_sub(1).and_then(gap), gap(index));
-            let default_half = 0.5 * Self::DEFAULT_WIDTH_MM;
+        let half_gaps: Vec<f64> = diameters_mm.windows(2).map(|pair| 0.5 * (pair[1] - pair[0])).collect();
+        let default_half = 0.5 * Self::DEFAULT_WIDTH_MM;
+        let mut bins = Vec::with_capacity(diameters_mm.len());
+        for (index, &diameter_mm) in diameters_mm.iter().enumerate() {
+            let below = index.checked_sub(1).and_then(|index| half_gaps.get(index)).copied();
+            let above = half_gaps.get(index).copied();
             let below_half = below.or(above).unwrap_or(default_half).min(diameter_mm);
             let above_half = above.or(below).unwrap_or(default_half);
-            Self { diameter_mm, range_mm: [diameter_mm - below_half, diameter_mm + above_half] }
-        };
-        diameters_mm.iter().enumerate().map(bin).collect()
+            bins.push(Self { diameter_mm, range_mm: [diameter_mm - below_half, diameter_mm + above_half] });
+        }
+        bins
     }
 
     /// Width dD, mm.

@@ -10,6 +10,11 @@ use crate::parameters::VelocityLaw;
 /// Density of water rho_p, kg/m^3.
 const WATER_DENSITY: f64 = 998.2;
 
+/// Sutherland's formula: viscosity of air at a temperature in K, up to a constant factor.
+fn sutherland(temperature_k: f64) -> f64 {
+    temperature_k * math::sqrt(temperature_k) / (temperature_k + 110.4)
+}
+
 /// Properties of the air that determine the fall of drops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FallAir {
@@ -30,7 +35,6 @@ impl FallAir {
     /// Dry air as an ideal gas, with Sutherland's formula for the viscosity, both relative to the air of the measurements: at 20 degrees
     /// Celsius and 1013.25 hPa, exactly the default.
     pub fn at(temperature_k: f64, pressure_pa: f64) -> Self {
-        let sutherland = |kelvin: f64| kelvin * math::sqrt(kelvin) / (kelvin + 110.4);
         let (scene, measured) = (air::Air { temperature_k, pressure_pa }, air::Air::default());
         let reference = Self::default();
         Self {
@@ -208,6 +212,12 @@ pub fn fixed_point_velocity(diameter_mm: f64, air: &FallAir) -> Result<f64, NoTe
 mod tests {
     use super::*;
     use crate::tests::reference::{near, rows};
+
+    #[test]
+    fn air_is_as_much_more_viscous_when_warm_as_in_tables() {
+        // 17.16 and 18.46 uPa s at 273.15 and 300 K.
+        assert!((sutherland(300.0) / sutherland(273.15) / (18.46 / 17.16) - 1.0).abs() < 1e-3);
+    }
 
     #[test]
     fn measured_velocities_are_those_of_gunn_and_kinzer() {

@@ -25,11 +25,12 @@ pub(crate) struct ScatteringTable {
 
 impl ScatteringTable {
     pub(crate) fn new(phase_function: &DropPhaseFunction) -> Self {
-        let at = |step: usize| {
+        let mut table: Vec<[f32; 3]> = Vec::with_capacity(TABLE_STEPS + 1);
+        for step in 0..=TABLE_STEPS {
             let half_sine = step as f32 / TABLE_STEPS as f32;
-            phase_function.phase(1.0 - 2.0 * half_sine * half_sine).map(|phase| phase * (0.25 / std::f32::consts::PI))
-        };
-        let table: Vec<[f32; 3]> = (0..=TABLE_STEPS).map(at).collect();
+            let phase = phase_function.phase(1.0 - 2.0 * half_sine * half_sine);
+            table.push(phase.map(|phase| phase * (0.25 / std::f32::consts::PI)));
+        }
         let max = table.iter().flatten().copied().fold(0.0, f32::max);
         Self { table, max }
     }

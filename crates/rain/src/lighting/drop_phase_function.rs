@@ -77,28 +77,26 @@ struct ExitingRay {
 /// Fresnel reflectances for s and p polarization at angles of incidence and refraction.
 fn fresnel_reflectances(incidence: f64, refraction: f64) -> [f64; 2] {
     let (difference, sum) = (incidence - refraction, incidence + refraction);
-    let square = |x: f64| x * x;
-    [
-        square(math::sin(difference)) / square(math::sin(sum)).max(f64::MIN_POSITIVE),
-        square(math::tan(difference)) / square(math::tan(sum)).max(f64::MIN_POSITIVE),
-    ]
+    let [sines, tangents] = [[difference, sum].map(math::sin), [difference, sum].map(math::tan)];
+    [sines, tangents].map(|[difference, sum]| difference * difference / (sum * sum).max(f64::MIN_POSITIVE))
 }
 
 /// Rays of all paths through a drop of refractive index `index`, at evenly spaced angles of incidence.
 fn trace_rays(index: f64) -> Vec<[ExitingRay; PATHS]> {
     let step = FRAC_PI_2 / RAYS as f64;
-    let paths = |ray: usize| {
+    let mut rays = Vec::with_capacity(RAYS);
+    for ray in 0..RAYS {
         let incidence = step * (ray as f64 + 0.5);
         let refraction = math::asin(math::sin(incidence) / index);
         let reflected = fresnel_reflectances(incidence, refraction);
         // The fraction of the disc's area at this angle, from d(sin^2 i): they sum to 1 over all angles.
         let fraction = math::sin(2.0 * incidence) * math::sin(step);
-        std::array::from_fn(|path| ExitingRay {
+        rays.push(std::array::from_fn(|path| ExitingRay {
             deviation: deviation(path, incidence, refraction),
             fraction: fraction * 0.5 * (exit_fraction(reflected[0], path) + exit_fraction(reflected[1], path)),
-        })
-    };
-    (0..RAYS).map(paths).collect()
+        }));
+    }
+    rays
 }
 
 /// Fraction of the light of one polarization that leaves by a path.
@@ -139,11 +137,15 @@ fn phase_table(rays: &[[ExitingRay; PATHS]]) -> [f64; ANGLE_STEPS + 1] {
 fn solid_angle(step: usize) -> f64 {
     let h = PI / ANGLE_STEPS as f64;
     let theta = h * step as f64;
-    // The integral of sin(theta) times the rising side of the hat, which ends at theta; the falling side by symmetry.
-    let side = |theta: f64| -math::cos(theta) + (math::sin(theta) - math::sin(theta - h)) / h;
-    let rising = if step > 0 { side(theta) } else { 0.0 };
-    let falling = if step < ANGLE_STEPS { side(PI - theta) } else { 0.0 };
+    let rising = if step > 0 { rising_side_integral(theta, h) } else { 0.0 };
+    // By symmetry, the falling side is the rising side that ends at pi - theta.
+    let falling = if step < ANGLE_STEPS { rising_side_integral(PI - theta, h) } else { 0.0 };
     2.0 * PI * (rising + falling)
+}
+
+/// Integral of `sin` times a line that rises from 0 at `theta - h` to 1 at `theta`.
+fn rising_side_integral(theta: f64, h: f64) -> f64 {
+    -math::cos(theta) + (math::sin(theta) - math::sin(theta - h)) / h
 }
 
 /// Directions along a golden-angle spiral, stratified by the cumulative distribution of the phase function.

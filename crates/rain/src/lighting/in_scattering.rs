@@ -52,17 +52,14 @@ impl InScattering {
             return Self::new(integrator, tiles, lights);
         }
         let lamps: Vec<DVec2> = lights.iter().flat_map(|light| lamp_images(light, camera, SMOOTH_RADIUS)).collect();
-        let is_near_lamp = |corner: usize| {
-            let here = DVec2::from(tiles.pixel(corner).map(|coordinate| coordinate as f64));
-            lamps.iter().any(|lamp| lamp.distance_squared(here) < SMOOTH_RADIUS * SMOOTH_RADIUS)
-        };
         let [columns, rows] = tiles.size;
-        let is_last = |index: usize, count: usize| index + 1 == count;
+        // The last column and row are integrated even if their index is odd: there is none beyond them to interpolate from.
         let is_integrated = |corner: usize| {
             let [column, row] = [corner % columns, corner / columns];
-            let is_second =
-                [(column, columns), (row, rows)].map(|(index, count)| index % 2 == 1 && !is_last(index, count));
-            !is_second[0] && !is_second[1] || is_near_lamp(corner)
+            let is_second = [(column, columns), (row, rows)].map(|(index, count)| index % 2 == 1 && index + 1 < count);
+            let position = DVec2::from(tiles.pixel(corner).map(|coordinate| coordinate as f64));
+            is_second == [false; 2]
+                || lamps.iter().any(|lamp| lamp.distance_squared(position) < SMOOTH_RADIUS * SMOOTH_RADIUS)
         };
         let mut scattering = Self::at_corners(integrator, tiles, lights, is_integrated);
         for row in (0..rows).step_by(2).chain((1..rows).step_by(2)) {
@@ -72,7 +69,7 @@ impl InScattering {
                     continue;
                 }
                 // Rows between others are interpolated from those, which come before them.
-                let step = if row % 2 == 1 && !is_last(row, rows) { columns } else { 1 };
+                let step = if row % 2 == 1 && row + 1 < rows { columns } else { 1 };
                 scattering.interpolate_corner(corner, step);
             }
         }

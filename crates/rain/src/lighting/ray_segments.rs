@@ -27,15 +27,12 @@ pub(super) struct OpticalDepthTable {
 impl OpticalDepthTable {
     /// From distances (m) and the optical depths up to them. Lamps light the first `lit_intervals`.
     pub(super) fn new(distances: &[f64], depths: &[f32], lit_intervals: usize) -> Self {
-        let interval = |k: usize| {
-            let width = (distances[k + 1] - distances[k]).max(f64::MIN_POSITIVE);
-            [distances[k] as f32, (1.0 / width) as f32, depths[k], depths[k + 1] - depths[k]]
-        };
-        Self {
-            distances: distances.iter().map(|distance| *distance as f32).collect(),
-            intervals: (0..distances.len() - 1).map(interval).collect(),
-            lit_intervals,
+        let mut intervals = Vec::with_capacity(distances.len());
+        for (ends, depths) in distances.windows(2).zip(depths.windows(2)) {
+            let width = (ends[1] - ends[0]).max(f64::MIN_POSITIVE);
+            intervals.push([ends[0] as f32, (1.0 / width) as f32, depths[0], depths[1] - depths[0]]);
         }
+        Self { distances: distances.iter().map(|distance| *distance as f32).collect(), intervals, lit_intervals }
     }
 
     /// Distances at which the light of lamps is stored.

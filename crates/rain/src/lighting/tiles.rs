@@ -68,8 +68,9 @@ impl TileGrid {
     pub(crate) fn at(&self, corners: &[[f32; 3]], [x, y]: [f32; 2]) -> [f32; 3] {
         let (column, row) = (self.column_at(x), self.row_at(y));
         let index = row.index * self.size[0] + column.index;
-        let row_color = |index: usize| lerp_color(corners[index], corners[index + 1], column.fraction);
-        lerp_color(row_color(index), row_color(index + self.size[0]), row.fraction)
+        let [above, below] =
+            [index, index + self.size[0]].map(|left| lerp_color(corners[left], corners[left + 1], column.fraction));
+        lerp_color(above, below, row.fraction)
     }
 
     /// Row of corners at a vertical position (pixels).

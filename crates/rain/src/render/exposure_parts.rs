@@ -28,12 +28,12 @@ pub(super) fn exposure_parts(view: &View) -> Vec<View> {
     if count == 1 {
         return vec![view.clone()];
     }
-    let time = |step: usize| open + (close - open) * (step as f64 / count as f64);
-    let part = |index: usize| {
-        let shutter = Shutter { open: time(index), close: time(index + 1) };
+    let times: Vec<f64> = (0..=count).map(|step| open + (close - open) * (step as f64 / count as f64)).collect();
+    let parts = times.windows(2).map(|ends| {
+        let shutter = Shutter { open: ends[0], close: ends[1] };
         View { camera: view.camera_at(shutter.middle()), shutter, ..view.clone() }
-    };
-    (0..count).map(part).collect()
+    });
+    parts.collect()
 }
 
 fn part_count(view: &View) -> usize {

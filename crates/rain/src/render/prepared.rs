@@ -139,14 +139,14 @@ fn culling_radiance(rain: &Rain, view: &View) -> f32 {
 fn metadata(rain: &Rain, view: &View, drops: f64, billboards: f64) -> Vec<MetadataEntry> {
     let t = view.shutter.middle();
     let sizes = DropSizeDistribution::marshall_palmer(rain.rate(t));
-    let entry = |name, unit, value| MetadataEntry { name, unit, value };
-    vec![
-        entry("rain_rate", "mm/h", rain.rate(t)),
-        entry("drops_in_view", "", drops.round()),
-        entry("billboards_in_view", "", billboards.round()),
-        entry("extinction", "1/m", extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL)),
-        entry("visibility", "m", visibility(&sizes)),
-    ]
+    let entries = [
+        ("rain_rate", "mm/h", rain.rate(t)),
+        ("drops_in_view", "", drops.round()),
+        ("billboards_in_view", "", billboards.round()),
+        ("extinction", "1/m", extinction(&sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL)),
+        ("visibility", "m", visibility(&sizes)),
+    ];
+    entries.map(|(name, unit, value)| MetadataEntry { name, unit, value }).into()
 }
 
 /// The streaks of a frame.

@@ -109,8 +109,9 @@ impl Streak {
         let w = self.half_chord(s);
         let b = b.clamp(-self.radius, self.radius);
         let area = 0.5 * self.blocked_area();
-        let chord_until = |b: f64| area * self.area_fraction_across(b);
-        let outside = chord_until(b.min(-w)) + (chord_until(b.max(w)) - chord_until(w));
+        // Integrals of the half chord from the streak's edge: before the middle part, up to `b` behind it, and up to its end.
+        let [before, behind, end] = [b.min(-w), b.max(w), w].map(|b| area * self.area_fraction_across(b));
+        let outside = before + (behind - end);
         let inside = s.abs() * (b.clamp(-w, w) + w);
         if s < 0.0 { -(outside + inside) } else { outside + inside }
     }

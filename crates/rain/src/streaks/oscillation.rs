@@ -37,22 +37,22 @@ pub struct Oscillation {
 impl Oscillation {
     /// The oscillation of a drop of diameter D with an `amplitude` of 0 to 1, and a phase of each mode, 0 to 1.
     pub fn new(diameter_mm: f64, amplitude: f64, phases: [f32; 2]) -> Self {
-        let mode = |index: usize| {
+        let modes = std::array::from_fn(|index| {
             let (n, fraction) = MODES[index];
             [TAU * mode_frequency(n, diameter_mm), TAU * f64::from(phases[index]), amplitude * fraction]
-        };
-        Self { modes: [mode(0), mode(1)] }
+        });
+        Self { modes }
     }
 
     /// Brightness between two times (s after the shutter opens), relative to its mean over a long time: `1 + sum of a sin(w t + phase)`, averaged.
     pub fn mean_brightness(&self, from: f64, to: f64) -> f64 {
-        let mean_sine = |[frequency, phase, amplitude]: [f64; 3]| {
+        let means = self.modes.into_iter().map(|[frequency, phase, amplitude]| {
             // The mean of a sine is its value at the middle times sinc.
             let (middle, half) = (0.5 * (from + to) * frequency + phase, 0.5 * (to - from) * frequency);
             let sinc = if half.abs() < 1e-6 { 1.0 } else { math::sin(half) / half };
             amplitude * sinc * math::sin(middle % (2.0 * PI))
-        };
-        1.0 + self.modes.into_iter().map(mean_sine).sum::<f64>()
+        });
+        1.0 + means.sum::<f64>()
     }
 
     /// Number of pieces of a streak of an exposure (s) that is `length` pixels long.

@@ -7,7 +7,7 @@ use bansho_base::{
         random::Purpose,
         simd::{LANES, Real},
     },
-    phenomenon::surroundings::{Emitter, Light},
+    phenomenon::surroundings::Light,
 };
 use fearless_simd::{Level, dispatch};
 
@@ -360,20 +360,18 @@ struct SphereF32 {
 impl PerDropRegion {
     pub(crate) fn new(shutter_state: &ShutterState, lights: &[Light]) -> Self {
         let eye = shutter_state.cameras.middle().position;
-        let lamp = |light: &Light| match light.emitter {
-            Emitter::Directional { .. } => None,
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(position),
-        };
         let radius = LAMP_RADIUS + FADE_WIDTH;
-        let near = |position: &DVec3| (*position - eye).length() < 1.1 * shutter_state.distance + radius;
-        let lamps = lights.iter().filter_map(lamp).filter(near).map(|center| Sphere { center, radius });
-        let spheres: Vec<Sphere> =
-            [shutter_state.around_camera(CAMERA_RADIUS + FADE_WIDTH)].into_iter().chain(lamps).collect();
-        let from_camera = |sphere: &Sphere| SphereF32 {
+        let mut spheres = vec![shutter_state.around_camera(CAMERA_RADIUS + FADE_WIDTH)];
+        for center in lights.iter().filter_map(|light| light.emitter.position()) {
+            if (center - eye).length() < 1.1 * shutter_state.distance + radius {
+                spheres.push(Sphere { center, radius });
+            }
+        }
+        let from_camera = spheres.iter().map(|sphere| SphereF32 {
             center: (sphere.center - eye).as_vec3().to_array(),
             radius: sphere.radius as f32,
-        };
-        Self { from_camera: spheres.iter().map(from_camera).collect(), spheres }
+        });
+        Self { from_camera: from_camera.collect(), spheres }
     }
 
     /// Spheres outside of which no drop is drawn one by one.

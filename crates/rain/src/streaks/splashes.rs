@@ -84,28 +84,31 @@ impl Splashes<'_> {
         if self.parameters.fraction <= 0.0 || eye_height >= reach {
             return Vec::new();
         }
-        let range = |center: f64| {
+        let [columns, layers] = [eye.x, eye.z].map(|center| {
             ((center - reach) / SQUARE_SIZE).floor() as i64..=((center + reach) / SQUARE_SIZE).floor() as i64
-        };
-        let squares: Vec<[i64; 2]> = range(eye.x).flat_map(|x| range(eye.z).map(move |z| [x, z])).collect();
-        let middle = |[x, z]: [i64; 2]| {
-            DVec3::new((x as f64 + 0.5) * SQUARE_SIZE, shutter_state.ground, (z as f64 + 0.5) * SQUARE_SIZE)
-        };
-        let is_visible = |square: &&[i64; 2]| {
-            (middle(**square) - eye).length() < reach
-                && shutter_state.cameras.may_be_visible(
-                    middle(**square),
-                    DVec3::new(0.5 * SQUARE_SIZE, 0.0, 0.5 * SQUARE_SIZE),
-                    0.3,
-                )
-        };
-        let squares: Vec<&[i64; 2]> = squares.iter().filter(is_visible).collect();
-        let chunk = |squares: &[&[i64; 2]]| {
-            let mut builder = StreakChunkBuilder::new(&shutter_state.cameras);
-            squares.iter().for_each(|square| self.square(**square, middle(**square), &mut builder));
-            builder.build()
-        };
-        squares.par_chunks(SQUARES_PER_CHUNK).map(chunk).collect()
+        });
+        let half_square = DVec3::new(0.5 * SQUARE_SIZE, 0.0, 0.5 * SQUARE_SIZE);
+        let mut visible_squares = Vec::new();
+        for square in columns.flat_map(|x| layers.clone().map(move |z| [x, z])) {
+            let middle = self.middle(square);
+            if (middle - eye).length() < reach && shutter_state.cameras.may_be_visible(middle, half_square, 0.3) {
+                visible_squares.push(square);
+            }
+        }
+        visible_squares
+            .par_chunks(SQUARES_PER_CHUNK)
+            .map(|squares| {
+                let mut builder = StreakChunkBuilder::new(&shutter_state.cameras);
+                squares.iter().for_each(|square| self.square(*square, self.middle(*square), &mut builder));
+                builder.build()
+            })
+            .collect()
+    }
+
+    /// The middle of a ground square, m.
+    fn middle(&self, [x, z]: [i64; 2]) -> DVec3 {
+        let ground = self.projection.shutter_state.ground;
+        DVec3::new((x as f64 + 0.5) * SQUARE_SIZE, ground, (z as f64 + 0.5) * SQUARE_SIZE)
     }
 
     /// The current period. A loop contains a whole number of periods.
@@ -193,9 +196,9 @@ impl Splashes<'_> {
             return;
         }
         let position = impact.position - cameras.middle().position;
-        let at = |age: f64| position + velocity * age - DVec3::Y * (0.5 * STANDARD_GRAVITY * age * age);
         let exposed_fraction = if half > 0.0 { (to - from) / (2.0 * half) } else { 1.0 };
-        for (vectors, point) in [(&mut paths.from, at(from)), (&mut paths.to, at(to))] {
+        for (vectors, age) in [(&mut paths.from, from), (&mut paths.to, to)] {
+            let point = position + velocity * age - DVec3::Y * (0.5 * STANDARD_GRAVITY * age * age);
             (0..3).for_each(|axis| vectors[axis][index] = point[axis] as f32);
         }
         paths.diameter_mm[index] = (impact.diameter_mm * (0.16 + 0.14 * random[3])) as f32;

@@ -54,14 +54,15 @@ pub(super) struct Quad<'a> {
 pub(super) fn heights(rows: i64, speed: f64, t: f64, range: RangeInclusive<f64>) -> impl Iterator<Item = f64> {
     let fallen = speed * t / VOXEL;
     // The camera may be a thousand kilometers above the ground: only rows that come into the range are looked at. One more on each side, for rounding.
-    let row = |height: f64| height / VOXEL - 0.5 + fallen;
-    let first = (row(*range.start()).floor() as i64).saturating_sub(1);
-    let last = (row(*range.end()).ceil() as i64).saturating_add(1);
+    let [lowest, highest] = [*range.start(), *range.end()].map(|height| height / VOXEL - 0.5 + fallen);
+    let first = (lowest.floor() as i64).saturating_sub(1);
+    let last = (highest.ceil() as i64).saturating_add(1);
     let mut candidates: Vec<i64> =
         (first..=last.min(first.saturating_add(rows - 1))).map(|row| row.rem_euclid(rows)).collect();
     candidates.sort_unstable();
-    let height = move |row: i64| ((row as f64 + 1.0 - fallen).rem_euclid(rows as f64) - 0.5) * VOXEL;
-    candidates.into_iter().map(height).filter(move |height| range.contains(height))
+    let heights =
+        candidates.into_iter().map(move |row| ((row as f64 + 1.0 - fallen).rem_euclid(rows as f64) - 0.5) * VOXEL);
+    heights.filter(move |height| range.contains(height))
 }
 
 impl<'a> Quad<'a> {
@@ -76,11 +77,10 @@ impl<'a> Quad<'a> {
     ) -> Self {
         let toward = center - view.camera.position;
         let right = DVec3::new(-toward.z, 0.0, toward.x).normalize_or(DVec3::X);
-        let corner = |index: usize| {
+        let corners: [DVec3; 4] = std::array::from_fn(|index| {
             let [across, up] = [(index & 1) as f64 - 0.5, (index >> 1) as f64 - 0.5];
             center + right * (across * VOXEL) + DVec3::Y * (up * VOXEL)
-        };
-        let corners: [DVec3; 4] = std::array::from_fn(corner);
+        });
         let radiance = corners.map(|corner| {
             lights.iter().fold([0.0; 3], |sum: [f32; 3], light| {
                 let (illuminance, _) = light.illuminance(corner);
@@ -115,9 +115,9 @@ fn pixel_bounds(center: DVec3, corners: &[DVec3; 4], view: &View) -> Rect {
         Lens::Panorama => bounds_in_panorama(center, camera),
     };
     let Some([low, high]) = bounds else { return Rect::from_size(view.size[0], view.size[1]) };
-    let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-    let [x, y] = [clamp(low.x.floor(), view.size[0]), clamp(low.y.floor(), view.size[1])];
-    let [right, bottom] = [clamp(high.x.ceil(), view.size[0]), clamp(high.y.ceil(), view.size[1])];
+    let size = DVec2::new(view.size[0] as f64, view.size[1] as f64);
+    let [x, y] = low.floor().clamp(DVec2::ZERO, size).to_array().map(|side| side as usize);
+    let [right, bottom] = high.ceil().clamp(DVec2::ZERO, size).to_array().map(|side| side as usize);
     Rect { x, y, width: right - x, height: bottom - y }
 }
 
@@ -194,11 +194,12 @@ impl<'a> TexturedBillboards<'a> {
         let (distance, ground) = (shutter_state.distance, shutter_state.ground);
         let rows = ((eye.y - ground).abs() + distance).ceil().max(1.0) as i64;
         let near = eye.y - ground - distance..=eye.y - ground + distance;
-        let range = |center: f64| (center - distance).floor() as i64..=(center + distance).floor() as i64;
+        let [columns, layers] =
+            [eye.x, eye.z].map(|center| (center - distance).floor() as i64..=(center + distance).floor() as i64);
         let mut quads = Vec::new();
         for (class, texture) in shutter_state.classes.iter().zip(set.of_rate(rate)) {
             let heights: Vec<f64> = heights(rows, class.speed, t, near.clone()).collect();
-            for (x, z) in range(eye.x).flat_map(|x| range(eye.z).map(move |z| (x, z))) {
+            for (x, z) in columns.clone().flat_map(|x| layers.clone().map(move |z| (x, z))) {
                 for height in &heights {
                     let center = DVec3::new((x as f64 + 0.5) * VOXEL, ground + height, (z as f64 + 0.5) * VOXEL);
                     let is_near = (center - eye).length() <= distance;
@@ -225,19 +226,21 @@ impl<'a> TexturedBillboards<'a> {
     /// Draws the billboards whose centers are in a slice.
     pub(crate) fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let rect = strip.rect;
-        let visible = |quad: &&Quad| {
-            slice.contains(quad.depth.max(self.view.camera.near)) && !quad.bounds.intersection(&rect).is_empty()
-        };
-        let mut quads = self.quads.iter().filter(visible).peekable();
+        let near = self.view.camera.near;
+        let mut quads = self
+            .quads
+            .iter()
+            .filter(|quad| slice.contains(quad.depth.max(near)) && !quad.bounds.intersection(&rect).is_empty())
+            .peekable();
         if quads.peek().is_none() {
             return;
         }
-        let pixel = |index: usize| {
+        let mut directions: Vec<[f32; 3]> = Vec::with_capacity(strip.len());
+        for index in 0..strip.len() {
             let [x, y] = [rect.x + index % rect.width, rect.y + index / rect.width];
             let direction = self.view.camera.direction(DVec2::new(x as f64, y as f64) + 0.5);
-            direction.unwrap_or(DVec3::ZERO).as_vec3().to_array()
-        };
-        let directions: Vec<[f32; 3]> = (0..strip.len()).map(pixel).collect();
+            directions.push(direction.unwrap_or(DVec3::ZERO).as_vec3().to_array());
+        }
         let mut aovs = std::mem::take(&mut strip.aovs);
         // Only rain draws into its strip, and its transmittance is the same for all colors.
         if let Some(mut planes) = strip.gray_planes_mut() {

@@ -71,8 +71,8 @@ impl TextureSet {
 
     /// The textures of the rate nearest to `rate` (mm/h), by diameter; none without rain.
     pub(crate) fn of_rate(&self, rate: f64) -> &[StreakTexture] {
-        let distance = |index: &usize| (self.rates[*index] - rate).abs();
-        let nearest = (0..self.rates.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let distances = self.rates.iter().map(|other| (other - rate).abs());
+        let nearest = distances.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(index, _)| index);
         nearest.filter(|_| rate > 0.0).map_or(&[], |index| &self.textures[index])
     }
 
@@ -84,18 +84,18 @@ impl TextureSet {
 
 impl StreakTexture {
     fn new(picture: &Image<1>, scale: f32) -> Self {
-        let code = |opacity: &f32| (opacity / scale * 255.0 + 0.5) as u8;
-        let codes: Vec<u8> = picture.pixels().as_flattened().iter().map(code).collect();
+        let opacities = picture.pixels().as_flattened().iter();
+        let codes: Vec<u8> = opacities.map(|opacity| (opacity / scale * 255.0 + 0.5) as u8).collect();
         let mut mipmaps = Vec::new();
         let (mut finer, mut side) =
             (codes.iter().map(|code| u32::from(*code) << 8).collect::<Vec<u32>>(), picture.width());
         while side > 1 {
             let half = side / 2;
-            let mean = |index: usize| {
+            let means = (0..half * half).map(|index| {
                 let first = 2 * (index / half) * side + 2 * (index % half);
                 (finer[first] + finer[first + 1] + finer[first + side] + finer[first + side + 1] + 2) / 4
-            };
-            let coarser: Vec<u32> = (0..half * half).map(mean).collect();
+            });
+            let coarser: Vec<u32> = means.collect();
             mipmaps.push(coarser.iter().map(|value| *value as u16).collect());
             (finer, side) = (coarser, half);
         }

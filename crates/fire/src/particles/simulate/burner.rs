@@ -190,8 +190,7 @@ struct BurnerSize {
 /// Corners of the bounding box of a rotated mesh.
 fn mesh_extent(mesh: &Mesh, placement: &Transform) -> [DVec3; 2] {
     let corners = mesh.triangles().flatten().map(|corner| placement.point_in_world(corner));
-    let extend = |[low, high]: [DVec3; 2], corner: DVec3| [low.min(corner), high.max(corner)];
-    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], extend)
+    corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], corner| [low.min(corner), high.max(corner)])
 }
 
 /// Corners of the bounding box of a rotated burner of an analytic shape.

@@ -165,11 +165,11 @@ pub fn check_particle_count(count: i64, others: i64) -> Result<(), ParticleError
 fn burners(parameters: &FlameParticlesParameters, assets: &dyn Assets) -> Result<Vec<Burner>, ParticleError> {
     let single = [BurnerParameters::default()];
     let listed = if parameters.burners.is_empty() { &single[..] } else { &parameters.burners };
-    let build = |(index, burner): (usize, &BurnerParameters)| {
+    let burners = listed.iter().enumerate().map(|(index, burner)| {
         Burner::new(burner, parameters, assets)
             .map_err(|kind| ParticleError { key: format!("burners.{index}.file"), kind })
-    };
-    listed.iter().enumerate().map(build).collect()
+    });
+    burners.collect()
 }
 
 /// Corners of the domain: as given, or with a margin of three flame heights around the burners.
@@ -195,14 +195,20 @@ fn domain(parameters: &FlameParticlesParameters, burners: &[Burner]) -> Result<[
             )?;
         }
     }
-    let margin = |burner: &Burner| burner.bounding_radius + 3.0 * burner.height;
-    // The bounding box of each burner's position over time.
-    let position_bounds =
-        || burners.iter().map(|burner| (burner, burner.parameters.position.bounds().map(DVec3::from)));
-    let low = position_bounds().map(|(burner, [low, _])| low - margin(burner)).fold(DVec3::INFINITY, DVec3::min);
-    let high = position_bounds().map(|(burner, [_, high])| high + margin(burner)).fold(DVec3::NEG_INFINITY, DVec3::max);
-    let set_or = |corner: Auto<[f64; 3]>, auto| if let Auto::Set(corner) = corner { DVec3::from(corner) } else { auto };
-    Ok([set_or(parameters.domain_min, low), set_or(parameters.domain_max, high)])
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for burner in burners {
+        let margin = burner.bounding_radius + 3.0 * burner.height;
+        // The bounding box of the burner's position over time.
+        let [first, last] = burner.parameters.position.bounds().map(DVec3::from);
+        (low, high) = (low.min(first - margin), high.max(last + margin));
+    }
+    if let Auto::Set(corner) = parameters.domain_min {
+        low = DVec3::from(corner);
+    }
+    if let Auto::Set(corner) = parameters.domain_max {
+        high = DVec3::from(corner);
+    }
+    Ok([low, high])
 }
 
 /// Checks whether a point of a burner lies within the given corners of the domain, with a `tolerance`, m. The error is returned with the key of the

@@ -94,14 +94,15 @@ impl EulerStep<'_> {
     /// Keeps as many particles of each burner as are to be alive at a time, those added last.
     fn remove_oldest(&self, particles: &mut GasParticles) {
         let DerivedConstants { rates, residence_times, .. } = self.constants;
-        let first_kept = |(burner, (rate, residence_time)): (usize, (&f64, &f64))| {
+        let mut first_kept = Vec::with_capacity(rates.len());
+        for (burner, (rate, residence_time)) in rates.iter().zip(residence_times).enumerate() {
             let alive = (rate * residence_time).round().max(1.0) as u64;
-            self.added_count(burner, self.time + self.parameters.step_s).saturating_sub(alive)
-        };
-        let first_kept: Vec<u64> = rates.iter().zip(residence_times).enumerate().map(first_kept).collect();
+            first_kept.push(self.added_count(burner, self.time + self.parameters.step_s).saturating_sub(alive));
+        }
         let GasParticles { id, burner, .. } = &*particles;
-        let is_kept = |(id, burner): (&u64, &u32)| id & ((1 << ORDINAL_BITS) - 1) >= first_kept[*burner as usize];
-        let keep: Vec<bool> = id.iter().zip(burner).map(is_kept).collect();
+        let ordinals = id.iter().map(|id| id & ((1 << ORDINAL_BITS) - 1));
+        let keep: Vec<bool> =
+            ordinals.zip(burner).map(|(ordinal, burner)| ordinal >= first_kept[*burner as usize]).collect();
         particles.retain(&keep);
     }
 
@@ -109,11 +110,11 @@ impl EulerStep<'_> {
     fn remove_outside(&self, particles: &mut GasParticles) {
         let [min, max] = self.constants.domain.map(|corner| corner.as_vec3());
         let [x, y, z] = particles.positions();
-        let is_inside = |index: usize| {
+        let are_inside = (0..x.len()).map(|index| {
             let position = Vec3::new(x[index], y[index], z[index]);
             position.cmpge(min).all() && position.cmple(max).all()
-        };
-        let keep: Vec<bool> = (0..x.len()).map(is_inside).collect();
+        });
+        let keep: Vec<bool> = are_inside.collect();
         particles.retain(&keep);
     }
 

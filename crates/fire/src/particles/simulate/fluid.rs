@@ -82,14 +82,13 @@ impl FluidSolver {
         let max_sound_speed = 0.2 * self.support_radius() / seconds;
         let (equation_of_state, per_kelvin, max_stiffness) =
             (self.equation_of_state, self.stiffness_per_kelvin, max_sound_speed * max_sound_speed);
-        let pressure = |(density, temperature): (&f32, &f32)| {
-            equation_of_state.pressure((per_kelvin * temperature).min(max_stiffness), *density)
-        };
         density
             .par_iter()
             .zip(&*temperature)
             .with_min_len(PARTICLES_PER_TASK)
-            .map(pressure)
+            .map(|(density, temperature)| {
+                equation_of_state.pressure((per_kelvin * temperature).min(max_stiffness), *density)
+            })
             .collect_into_vec(&mut self.pressure);
         self.force.compute_accelerations(&self.cells, mass, density, &self.pressure, &mut self.acceleration);
     }

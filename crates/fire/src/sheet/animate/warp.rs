@@ -64,8 +64,9 @@ impl WindLean {
     /// The tangent is the ratio of drift to rise. It saturates smoothly, since a sheet cannot represent a horizontal flame.
     pub(crate) fn new(wind: &Wind, point: DVec3, t: f64, right: DVec3, rise_speed: f64, response: f64) -> Self {
         let velocity = wind.at(point, t) * (response / rise_speed.max(0.05));
-        let soft_clamp = |tangent: f64| Self::MAX_TANGENT * math::tanh(tangent / Self::MAX_TANGENT);
-        Self { across: soft_clamp(velocity.dot(right)), toward: soft_clamp(velocity.dot(right.cross(DVec3::Y))) }
+        let [across, toward] = [velocity.dot(right), velocity.dot(right.cross(DVec3::Y))]
+            .map(|tangent| Self::MAX_TANGENT * math::tanh(tangent / Self::MAX_TANGENT));
+        Self { across, toward }
     }
 }
 

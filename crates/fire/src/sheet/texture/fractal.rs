@@ -71,12 +71,12 @@ struct LatticeCoordinate {
 /// Lattice coordinates of `count` texels on a lattice of `cells` cells.
 fn lattice_coordinates(count: usize, cells: usize) -> Vec<LatticeCoordinate> {
     let width = count / cells;
-    let coordinate = |i: usize| {
+    let coordinates = (0..count).map(|i| {
         let f = (i % width) as f32 / width as f32;
         let fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
         LatticeCoordinate { cell: i / width, next_cell: (i / width + 1) % cells, fraction: f, fade }
-    };
-    (0..count).map(coordinate).collect()
+    });
+    coordinates.collect()
 }
 
 /// Sum of octaves of noise, each with twice the frequency and `gain` times the amplitude of the previous one.
@@ -100,11 +100,11 @@ fn warped_noise() -> Texels {
     let gas = TextureTable::new(&fractal_noise(4, 0.5, key, Purpose::named("gas")));
     let across = fractal_noise(2, 0.5, key, Purpose::named("stir across"));
     let up = fractal_noise(2, 0.5, key, Purpose::named("stir up"));
-    let coordinate = |i: usize| {
+    let warped = (0..ROWS * COLUMNS).map(|i| {
         let column = WARP_TEXELS[0].fma(across[i], (i % COLUMNS) as f32);
         gas.bilinear(column, WARP_TEXELS[1].fma(up[i], (i / COLUMNS) as f32))
-    };
-    equalize_histogram((0..ROWS * COLUMNS).map(coordinate).collect())
+    });
+    equalize_histogram(warped.collect())
 }
 
 /// Histogram equalization: replaces each value by its rank in [0, 1]. The paper requires a texture whose values are uniformly distributed.
@@ -113,18 +113,19 @@ fn equalize_histogram(texels: Texels) -> Texels {
     let low = texels.iter().copied().fold(f32::INFINITY, f32::min);
     let high = texels.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let scale = BINS as f32 / (high - low).max(f32::MIN_POSITIVE);
-    let coordinate = |value: f32| ((value - low) * scale).min(BINS as f32 - 0.001);
+    // In bins; less than the last bin's end, so that the largest value is in it.
+    let coordinates: Vec<f32> =
+        texels.into_iter().map(|value| ((value - low) * scale).min(BINS as f32 - 0.001)).collect();
     let mut below = vec![0.0_f64; BINS + 1];
-    texels.iter().for_each(|value| below[coordinate(*value) as usize + 1] += 1.0 / texels.len() as f64);
+    coordinates.iter().for_each(|value| below[*value as usize + 1] += 1.0 / coordinates.len() as f64);
     for bin in 0..BINS {
         below[bin + 1] += below[bin];
     }
-    let rank = |value: f32| {
-        let coordinate = coordinate(value);
+    let ranks = coordinates.into_iter().map(|coordinate| {
         let bin = coordinate as usize;
         math::lerp(below[bin], below[bin + 1], f64::from(coordinate) - bin as f64) as f32
-    };
-    texels.into_iter().map(rank).collect()
+    });
+    ranks.collect()
 }
 
 /// Mean of two uniformly distributed numbers, equalized: their sum has a triangular distribution, whose cumulative distribution function is applied.

@@ -171,12 +171,12 @@ impl StreakCube {
         let key = Key::new(seed, &format!("streaks of {} mm", bin.diameter_mm));
         let [high, low, ..] = key.words(0, 0, COUNT);
         let count = stratified_count(self.mean_count(sizes, bin), variant, [high, low]);
-        let drop = |index: u64| {
+        let drops = (0..count).map(|index| {
             let [x, y, z, size] = key.words(index, variant, POSITION).map(|word| random::uniform_f64(word, 0));
             let diameter_mm = if self.spread { sizes.quantile(size, bin.range_mm) } else { bin.diameter_mm };
             FallingDrop::new(diameter_mm, [x, y, z].map(|fraction| fraction * self.edge), &self.terminal_velocity)
-        };
-        Ok((0..count).map(drop).collect())
+        });
+        Ok(drops.collect())
     }
 
     /// The streak that a drop leaves.

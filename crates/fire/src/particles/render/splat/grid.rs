@@ -34,11 +34,11 @@ impl Raster {
 
     /// The cells that are in both.
     pub(crate) fn intersection(self, other: &Self) -> Self {
-        let ends = |cells: &Self| [cells.first[0] + cells.columns as i32, cells.first[1] + cells.rows as i32];
+        let [ends, other_ends] =
+            [&self, other].map(|cells| [cells.first[0] + cells.columns as i32, cells.first[1] + cells.rows as i32]);
         let first = [0, 1].map(|axis| self.first[axis].max(other.first[axis]));
-        let [right, bottom] = [0, 1].map(|axis| ends(&self)[axis].min(ends(other)[axis]));
-        let count = |first: i32, end: i32| (end - first).max(0) as usize;
-        Self { first, columns: count(first[0], right), rows: count(first[1], bottom), ..self }
+        let [columns, rows] = [0, 1].map(|axis| (ends[axis].min(other_ends[axis]) - first[axis]).max(0) as usize);
+        Self { first, columns, rows, ..self }
     }
 
     /// Its columns, counted from the picture's corner.
@@ -48,12 +48,10 @@ impl Raster {
 
     /// The pixels of the picture that the cells cover.
     pub(crate) fn covered(&self) -> Rect {
-        let side = |axis: usize, count: usize| {
-            let pixel = |cell: i64| cell.max(0) as usize * self.size;
-            let first = i64::from(self.first[axis]);
-            (pixel(first), pixel(first + count as i64))
-        };
-        let ((x, right), (y, bottom)) = (side(0, self.columns), side(1, self.rows));
+        let [[x, right], [y, bottom]] =
+            [(self.first[0], self.columns), (self.first[1], self.rows)].map(|(first, count)| {
+                [i64::from(first), i64::from(first) + count as i64].map(|cell| cell.max(0) as usize * self.size)
+            });
         Rect { x, y, width: right - x, height: bottom - y }
     }
 
@@ -147,11 +145,11 @@ impl<'a> Grid<'a> {
 
     /// For `count` pixels of a row from `x` on, the first of the four surrounding columns and the pixel's phase.
     pub(crate) fn columns(&self, x: usize, count: usize) -> Vec<(usize, usize)> {
-        let column = |x: usize| {
+        let columns = (x..x + count).map(|x| {
             let (cell, phase) = self.cells.cell_before(0, x);
             (self.first_of_four(cell), phase)
-        };
-        (x..x + count).map(column).collect()
+        });
+        columns.collect()
     }
 
     /// The first of the four columns around a position for which `cell` is the preceding cell.

@@ -68,14 +68,14 @@ impl TurbulenceTile {
 
     /// The eddies at `t` in gas that rises at `speed` m/s, displaced by `drift` m by the wind since time 0; the largest are `eddy_size` m wide.
     pub(crate) fn at(&self, t: f64, eddy_size: f64, speed: f64, drift: DVec3) -> EddyField<'_> {
-        let layer = |index: usize| {
+        let layers = std::array::from_fn(|index| {
             let scale = SIDE as f64 / (f64::from(EDDIES) * eddy_size) * (index + 1) as f64;
             let moved = DVec3::Y * (speed * LAYER_SPEED[index] * t) + drift;
             // The offset keeps the zeros of the layers from coinciding. Reduced in f64, so that no precision is lost even after hours.
             let origin = (-moved * scale + 11.3 * index as f64).rem_euclid(DVec3::splat(SIDE as f64));
             EddyLayer { scale: scale as f32, origin: origin.as_vec3().to_array() }
-        };
-        EddyField { tile: self.tile(), layers: [layer(0), layer(1)] }
+        });
+        EddyField { tile: self.tile(), layers }
     }
 }
 
@@ -160,25 +160,32 @@ fn sample(tile: &[[f32; 4]], position: Vec3) -> [f32; 4] {
 fn potential(seed: u32) -> Vec<f32> {
     // The fractal and the period are constants within their bounds.
     let Ok(noise) = Noise::<3>::new(seed, Fractal::SINGLE, [EDDIES; 3]) else { return vec![0.0; SIDE * SIDE * SIDE] };
-    let coordinate = |step: usize| Coordinate::from_f64((step * EDDIES as usize) as f64 / SIDE as f64);
-    let value_at = |index: usize| {
-        noise.at([coordinate(index % SIDE), coordinate(index / SIDE % SIDE), coordinate(index / (SIDE * SIDE))])
-    };
-    (0..SIDE * SIDE * SIDE).map(value_at).collect()
+    let coordinates: [Coordinate; SIDE] =
+        std::array::from_fn(|step| Coordinate::from_f64((step * EDDIES as usize) as f64 / SIDE as f64));
+    let values = (0..SIDE * SIDE * SIDE).map(|index| {
+        noise.at([index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)].map(|step| coordinates[step]))
+    });
+    values.collect()
 }
 
 /// Curl of the potentials at a grid point, by central differences.
-fn curl(potentials: &[Vec<f32>; 3], index: usize) -> Vec3 {
-    let position = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
-    let slope = |of: usize, along: usize| {
-        let value = |step: usize| {
-            let mut neighbor = position;
-            neighbor[along] = (neighbor[along] + step) % SIDE;
-            potentials[of][(neighbor[2] * SIDE + neighbor[1]) * SIDE + neighbor[0]]
-        };
-        value(1) - value(SIDE - 1)
-    };
-    Vec3::new(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1))
+fn curl([x, y, z]: &[Vec<f32>; 3], index: usize) -> Vec3 {
+    Vec3::new(
+        central_difference(z, index, 1) - central_difference(y, index, 2),
+        central_difference(x, index, 2) - central_difference(z, index, 0),
+        central_difference(y, index, 0) - central_difference(x, index, 1),
+    )
+}
+
+/// Difference of the potential at the two neighbors of a point of the periodic grid along an axis.
+fn central_difference(potential: &[f32], index: usize, axis: usize) -> f32 {
+    let point = [index % SIDE, index / SIDE % SIDE, index / (SIDE * SIDE)];
+    let [next, previous] = [1, SIDE - 1].map(|step| {
+        let mut neighbor = point;
+        neighbor[axis] = (neighbor[axis] + step) % SIDE;
+        potential[(neighbor[2] * SIDE + neighbor[1]) * SIDE + neighbor[0]]
+    });
+    next - previous
 }
 
 #[cfg(test)]

@@ -93,12 +93,13 @@ pub(crate) fn active_rings(
     let disk_area = std::f64::consts::FRAC_PI_4 * burner.diameter * burner.diameter;
     let streams = (burner.area_m2 / disk_area).round().clamp(1.0, MAX_STREAMS) as u32;
     let latest = (t * hz).floor() as i64 + 1;
-    let stream_rings = |stream: u32| {
+    let mut rings = Vec::new();
+    for stream in 0..streams {
         let shedding =
             VortexShedding { burner, key, purpose: Purpose(burner_index * 64 + stream), streams, hz, t, axis };
-        (0..MAX_RINGS).filter_map(move |back| shedding.ring(latest - back, flame.forces.puffing))
-    };
-    (0..streams).flat_map(stream_rings).collect()
+        rings.extend((0..MAX_RINGS).filter_map(|back| shedding.ring(latest - back, flame.forces.puffing)));
+    }
+    rings
 }
 
 /// Inputs of the rings of one stream.
