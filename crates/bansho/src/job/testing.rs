@@ -37,7 +37,6 @@ pub(crate) struct CountingSource {
     plan: Arc<Plan>,
     pub(crate) steps: usize,
     pub(crate) number: i64,
-    drawn: bool,
 }
 
 impl CountingSource {

@@ -15,6 +15,7 @@ use bansho_base::{
         observer::{Cancelled, Observer, PartGuard, Stage, StageGuard, StagePart},
         parallel::prelude::*,
     },
+    image::Rect,
     math::DVec3,
     parameters::BuildError,
     phenomenon::{

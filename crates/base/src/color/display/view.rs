@@ -96,7 +96,7 @@ impl View {
     /// The convention of alpha in this view where `requested` is asked for: `raw` encodes nothing, so its alpha is always linear.
     #[must_use]
     pub fn alpha_convention(&self, requested: AlphaConvention) -> AlphaConvention {
-        if self.tone.is_none() { AlphaConvention::Linear } else { requested }
+        if self.transform == Transform::Raw { AlphaConvention::Linear } else { requested }
     }
 
     /// The view's name.
