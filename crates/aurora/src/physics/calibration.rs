@@ -135,8 +135,8 @@ fn metrics_at(table: &Emission, energy_kev: f64) -> ColumnMetrics {
     let energy_ev = energy_kev * 1e3;
     let profile = table.profile(energy_ev);
     let [green, red, blue, first_positive] = table.column(energy_ev).kilorayleigh;
-    let red_at = |level: usize| profile[level][SpectralEmitter::OxygenRed.index()];
-    let above = (0..LEVELS).filter(|level| level_altitude_km(*level) >= 200.0).map(red_at).sum::<f64>();
+    let red_light: Vec<f64> = profile.iter().map(|light| light[SpectralEmitter::OxygenRed.index()]).collect();
+    let above: f64 = (0..LEVELS).filter(|level| level_altitude_km(*level) >= 200.0).map(|level| red_light[level]).sum();
     ColumnMetrics {
         energy_kev,
         deposition_peak_km: peak_km(|level| table.deposition().ionization(energy_ev, level_altitude_km(level))),
@@ -144,7 +144,7 @@ fn metrics_at(table: &Emission, energy_kev: f64) -> ColumnMetrics {
         blue_rayleigh: blue * 1e3,
         green_to_blue: green / blue,
         red_to_blue: red / blue,
-        red_above_200_km: above / (0..LEVELS).map(red_at).sum::<f64>(),
+        red_above_200_km: above / red_light.iter().sum::<f64>(),
         first_positive_to_green: first_positive / green,
         red_lifetime: table.column(energy_ev).lifetime[SpectralEmitter::OxygenRed.index()],
     }

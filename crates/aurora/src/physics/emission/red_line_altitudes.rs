@@ -25,12 +25,12 @@ pub(crate) fn red_altitude_weights(altitude_km: f64) -> [f64; RED_ALTITUDES] {
 /// Red light of each level, split by altitude in place of the emitters; the last component is 0.
 #[must_use]
 pub(crate) fn red_by_altitude(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
-    let divided = |(level, light): (usize, &PerEmitter<f64>)| {
+    let divided = profile.iter().enumerate().map(|(level, light)| {
         let [low, middle, high] = red_altitude_weights(level_altitude_km(level))
             .map(|weight| weight * light[SpectralEmitter::OxygenRed.index()]);
         [low, middle, high, 0.0]
-    };
-    profile.iter().enumerate().map(divided).collect()
+    });
+    divided.collect()
 }
 
 /// Lifetimes in s, averaged over the levels with the weights and the emission. `levels` yields emission and lifetime.

@@ -78,12 +78,13 @@ impl Emission {
             .map(|node| column(&photons, &persistence, deposition.spectrum_profile(node), node_energy_ev(node)))
             .collect();
         let red = SpectralEmitter::OxygenRed.index();
-        let red_lifetimes = |node: usize| {
+        let mut red_lifetimes = Vec::with_capacity(NODES);
+        for node in 0..NODES {
             let light =
                 photons.iter().zip(deposition.spectrum_profile(node)).map(|(photons, pairs)| photons[red] * pairs);
-            mean_lifetimes(light.zip(persistence.iter().map(|persistence| persistence[red].lifetime)))
-        };
-        let red_lifetimes = (0..NODES).map(red_lifetimes).collect();
+            let lifetimes = persistence.iter().map(|persistence| persistence[red].lifetime);
+            red_lifetimes.push(mean_lifetimes(light.zip(lifetimes)));
+        }
         Self { deposition, lines, spread, photons, columns, red_lifetimes }
     }
 
@@ -118,11 +119,11 @@ impl Emission {
     pub fn profile(&self, energy_ev: f64) -> Vec<PerEmitter<f64>> {
         let (node, mixing) = energy_grid::locate(energy_ev);
         let (low, high) = (self.deposition.spectrum_profile(node), self.deposition.spectrum_profile(node + 1));
-        let emission = |level: usize| {
+        let emission = (0..LEVELS).map(|level| {
             let pairs = lerp(low[level], high[level], mixing);
             self.photons[level].map(|photons| photons * pairs)
-        };
-        (0..LEVELS).map(emission).collect()
+        });
+        emission.collect()
     }
 
     /// Volume emission rate of each emitter, photons m^-3 s^-1 per mW m^-2, for the spectrum about an energy at one
@@ -134,14 +135,8 @@ impl Emission {
         }
         let (level, fraction) = locate_level(altitude_km);
         let (node, mixing) = energy_grid::locate(energy_ev);
-        let pairs = |level: usize| {
-            lerp(
-                self.deposition.spectrum_profile(node)[level],
-                self.deposition.spectrum_profile(node + 1)[level],
-                mixing,
-            )
-        };
-        let (below, above) = (pairs(level), pairs(level + 1));
+        let [low, high] = [node, node + 1].map(|node| self.deposition.spectrum_profile(node));
+        let [below, above] = [level, level + 1].map(|level| lerp(low[level], high[level], mixing));
         std::array::from_fn(|i| lerp(below * self.photons[level][i], above * self.photons[level + 1][i], fraction))
     }
 
@@ -150,13 +145,10 @@ impl Emission {
     pub fn column(&self, energy_ev: f64) -> ColumnEmission {
         let (node, mixing) = energy_grid::locate(energy_ev);
         let (low, high) = (&self.columns[node], &self.columns[node + 1]);
-        let between = |low: PerEmitter<f64>, high: PerEmitter<f64>| -> PerEmitter<f64> {
-            std::array::from_fn(|i| lerp(low[i], high[i], mixing))
-        };
         ColumnEmission {
-            kilorayleigh: between(low.kilorayleigh, high.kilorayleigh),
-            lifetime: between(low.lifetime, high.lifetime),
-            spread_km: between(low.spread_km, high.spread_km),
+            kilorayleigh: std::array::from_fn(|i| lerp(low.kilorayleigh[i], high.kilorayleigh[i], mixing)),
+            lifetime: std::array::from_fn(|i| lerp(low.lifetime[i], high.lifetime[i], mixing)),
+            spread_km: std::array::from_fn(|i| lerp(low.spread_km[i], high.spread_km[i], mixing)),
         }
     }
 
@@ -202,20 +194,20 @@ fn column(
     pairs: &AltitudeProfile,
     energy_ev: f64,
 ) -> ColumnEmission {
-    let of = |emitter: SpectralEmitter| {
-        let light = |level: usize| photons[level][emitter.index()] * pairs[level];
-        let whole: f64 = (0..LEVELS).map(light).sum();
+    let columns = EMITTERS.map(|emitter| {
+        let light: [f64; LEVELS] = std::array::from_fn(|level| photons[level][emitter.index()] * pairs[level]);
+        let whole: f64 = light.iter().sum();
         let mut below = 0.0;
-        let half = (0..LEVELS).take_while(|level| {
-            below += light(*level);
+        let half = light.iter().take_while(|light| {
+            below += **light;
             below < 0.5 * whole
         });
         let at_half = &persistence[half.count().min(LEVELS - 1)][emitter.index()];
-        let lifetimes: f64 = (0..LEVELS).map(|level| light(level) * persistence[level][emitter.index()].lifetime).sum();
+        let levels = light.iter().zip(persistence);
+        let lifetimes: f64 = levels.map(|(light, persistence)| light * persistence[emitter.index()].lifetime).sum();
         let kilorayleigh = whole * LEVEL_SPACING / PHOTONS_PER_KILORAYLEIGH;
         [kilorayleigh, lifetimes / whole, at_half.spread(energy_ev) * 1e-3]
-    };
-    let columns = EMITTERS.map(of);
+    });
     ColumnEmission {
         kilorayleigh: columns.map(|[kilorayleigh, ..]| kilorayleigh),
         lifetime: columns.map(|[_, lifetime, _]| lifetime),

@@ -119,8 +119,11 @@ pub fn column_ion_pairs(profile: &AltitudeProfile) -> f64 {
 fn interpolate(profiles: &[AltitudeProfile], energy_ev: f64, altitude_km: f64) -> f64 {
     let (level, fraction) = locate_level(altitude_km);
     let (node, mixing) = energy_grid::locate(energy_ev);
-    let at = |node: usize| lerp(profiles[node][level], profiles[node][level + 1], fraction);
-    if crate::physics::atmosphere::covers(altitude_km) { lerp(at(node), at(node + 1), mixing) } else { 0.0 }
+    if !crate::physics::atmosphere::covers(altitude_km) {
+        return 0.0;
+    }
+    let [low, high] = [node, node + 1].map(|node| lerp(profiles[node][level], profiles[node][level + 1], fraction));
+    lerp(low, high, mixing)
 }
 
 /// Weighted sum of profiles.

@@ -143,12 +143,13 @@ impl<'a> ProfilesAroundObserver<'a> {
     /// The mip levels of the part of a profile above or below the observer. A level of the atmosphere stands for half a kilometer on both sides of its
     /// altitude.
     fn part(&self, values: &[PerEmitter<f32>], is_above: bool) -> Vec<PerEmitter<f32>> {
-        let fraction = |entry: usize| {
+        let mut light_of_part = Vec::with_capacity(STARTS[1]);
+        for (entry, light) in values[..STARTS[1]].iter().enumerate() {
             let above = (f64::from(BOTTOM_KM) + entry as f64 - 1.0 - self.observer_altitude_km + 0.5).clamp(0.0, 1.0);
-            if is_above { above } else { 1.0 - above }
-        };
-        let entries = values[..STARTS[1]].iter().enumerate();
-        mip_levels(entries.map(|(entry, light)| light.map(|value| f64::from(value) * fraction(entry))).collect())
+            let fraction = if is_above { above } else { 1.0 - above };
+            light_of_part.push(light.map(|value| f64::from(value) * fraction));
+        }
+        mip_levels(light_of_part)
     }
 }
 
@@ -173,16 +174,17 @@ impl MipTables {
 
 /// All mip levels, from the volume emission at each level.
 fn smoothed(profile: &[PerEmitter<f64>]) -> Vec<PerEmitter<f32>> {
-    let light_of = |photons: &PerEmitter<f64>| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH);
-    mip_levels(std::iter::once([0.0; 4]).chain(profile.iter().map(light_of)).collect())
+    let light = profile.iter().map(|photons| photons.map(|photons| photons * 1e3 / PHOTONS_PER_KILORAYLEIGH));
+    mip_levels(std::iter::once([0.0; 4]).chain(light).collect())
 }
 
 /// All mip levels of a table, concatenated.
 fn mip_levels(mut table: Vec<PerEmitter<f64>>) -> Vec<PerEmitter<f32>> {
     let mut light = Vec::with_capacity(STARTS[MIP_LEVELS]);
     for mip_level in 0..MIP_LEVELS {
-        let entry = |at: usize| table.get(at).copied().unwrap_or_default();
-        light.extend((0..entries(mip_level)).map(|at| entry(at).map(|value| value as f32)));
+        // Beyond the table there is no light.
+        let padded = table.iter().copied().chain(std::iter::repeat([0.0; 4]));
+        light.extend(padded.take(entries(mip_level)).map(|entry| entry.map(|value| value as f32)));
         table = downsampled(&table);
     }
     light
@@ -205,12 +207,14 @@ fn table_energy_ev(table_index: usize) -> f64 {
 
 /// Downsamples by two with the filter 1/4, 1/2, 1/4, which conserves the sum.
 fn downsampled(table: &[PerEmitter<f64>]) -> Vec<PerEmitter<f64>> {
-    let entry = |at: Option<usize>| at.and_then(|at| table.get(at)).copied().unwrap_or_default();
-    let smoothed = |number: usize| -> PerEmitter<f64> {
-        let near = [2, 1, 0].map(|before| entry((2 * number).checked_sub(before)));
+    let smoothed = (0..table.len() / 2 + 2).map(|number| -> PerEmitter<f64> {
+        let near = [2, 1, 0].map(|before| {
+            let entry = (2 * number).checked_sub(before).and_then(|entry| table.get(entry));
+            entry.copied().unwrap_or_default()
+        });
         std::array::from_fn(|i| 0.25 * near[0][i] + 0.5 * near[1][i] + 0.25 * near[2][i])
-    };
-    (0..table.len() / 2 + 2).map(smoothed).collect()
+    });
+    smoothed.collect()
 }
 
 fn top_km(profile: &[PerEmitter<f64>], emitter: usize) -> f32 {
@@ -219,22 +223,21 @@ fn top_km(profile: &[PerEmitter<f64>], emitter: usize) -> f32 {
 }
 
 fn bottom_km(profile: &[PerEmitter<f64>], emitters: &[usize]) -> f32 {
-    let bottom = |emitter: &usize| {
-        level_altitude_km(levels_within_cutoff(0..LEVELS, profile, *emitter).saturating_sub(1)) as f32
-    };
-    emitters.iter().map(bottom).fold(f32::INFINITY, f32::min)
+    let bottoms = emitters
+        .iter()
+        .map(|emitter| level_altitude_km(levels_within_cutoff(0..LEVELS, profile, *emitter).saturating_sub(1)) as f32);
+    bottoms.fold(f32::INFINITY, f32::min)
 }
 
 /// Number of levels, in iteration order, within the cutoff fraction.
 fn levels_within_cutoff(levels: impl Iterator<Item = usize>, profile: &[PerEmitter<f64>], emitter: usize) -> usize {
-    let light = |level: usize| profile[level][emitter];
-    let whole: f64 = (0..LEVELS).map(light).sum();
+    let whole: f64 = (0..LEVELS).map(|level| profile[level][emitter]).sum();
     let mut sum = 0.0;
-    let within_cutoff = |level: &usize| {
-        sum += light(*level);
+    let levels_within = levels.take_while(|level| {
+        sum += profile[*level][emitter];
         sum < CUTOFF_FRACTION * whole
-    };
-    levels.take_while(within_cutoff).count()
+    });
+    levels_within.count()
 }
 
 /// Altitude of the second entry of all tables, km.
