@@ -250,7 +250,6 @@ impl<'a> Composition<'a> {
     }
 
     /// Draws what is prepared of a member in a slice into `strip`, over the pixels of `rect`.
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn draw_member(
         &self,
         member: usize,

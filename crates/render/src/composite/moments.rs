@@ -215,7 +215,6 @@ impl Composition<'_> {
     }
 
     /// Draws the slices within `rect` at each moment, into an accumulator for each.
-    #[allow(clippy::too_many_arguments)]
     fn draw_moments(
         &self,
         level: Level,
