@@ -106,9 +106,8 @@ fn check(points: &PointCloud) {
 }
 
 fn check_next(shot: &mut Shot) {
-    if shot.advance(1, &Unobserved).is_ok() && shot.draw(&Unobserved).is_ok() {
+    if let Ok(frame) = bansho::draw(shot, 1, &Unobserved) {
         check(&shot.particles());
-        let frame = shot.read().expect("what was drawn can be read");
         assert!(frame.beauty.pixels().iter().flatten().all(|value| value.is_finite()), "the picture is not finite");
     }
 }

@@ -20,7 +20,7 @@ use bansho_media::{
     limits,
 };
 use bansho_render::{
-    CompiledScene, Plan, PlanOptions, RenderError, Shot,
+    CompiledScene, Plan, PlanOptions, RenderError, SceneLinear, Shot,
     display::{BitDepth, display},
 };
 use bansho_scene::{Scene, SceneOptions};
@@ -76,10 +76,10 @@ pub fn draw_small(mut scene: Scene, assets: MemoryAssets) -> bool {
     }
     let mut shot = Shot::open(compiled, Arc::new(plan));
     let deadline = Deadline(Instant::now() + Duration::from_secs(2));
-    match shot.advance(number, &deadline).and_then(|()| shot.draw(&deadline)) {
+    match shot.advance(number, &deadline).and_then(|()| shot.draw(&SceneLinear, &deadline)) {
         Err(RenderError::Cancelled(_)) => {}
         Err(error) => panic!("a checked scene cannot be drawn: {error}"),
-        Ok(()) => check(&shot.read().expect("what was drawn can be read")),
+        Ok(frame) => check(&frame),
     }
     true
 }

@@ -22,7 +22,7 @@ use bansho_base::{
     tables::{BuildContext, PhenomenonTable, TableKind},
 };
 use bansho_render::{
-    CompiledScene, Plan, PlanOptions, Shot,
+    CompiledScene, Plan, PlanOptions, SceneLinear, Shot,
     display::{BitDepth, display},
 };
 use bansho_scene::Scene;
@@ -173,8 +173,7 @@ fn plan(text: &str) -> Planned {
 }
 
 fn frame(shot: &mut Shot) -> Frame {
-    shot.draw(&Unobserved).expect("nobody cancels");
-    shot.read().expect("a frame was drawn")
+    shot.draw(&SceneLinear, &Unobserved).expect("nobody cancels")
 }
 
 /// Draws a frame, uses it and recycles it, as a job does.

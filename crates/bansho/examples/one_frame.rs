@@ -9,7 +9,7 @@ use std::{
 };
 
 use bansho::{
-    AlphaConvention, BitDepth, CompiledScene, MemoryAssets, Plan, PlanOptions, SceneBuilder, Shot, Unobserved, View,
+    CompiledScene, DisplayOptions, MemoryAssets, Plan, PlanOptions, SceneBuilder, Shot, Unobserved,
     base::frame::DisplayPixels, fire::sheet::FlameSheetParameters, scene::PictureParameters,
 };
 
@@ -21,9 +21,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let compiled = Arc::new(CompiledScene::build(Arc::new(scene), Arc::new(MemoryAssets::default()), None)?);
     let plan = Plan::new(&compiled, &PlanOptions::default())?;
     let mut shot = Shot::open(compiled, Arc::new(plan));
-    let frame = bansho::draw(&mut shot, 30, &Unobserved)?;
+    shot.advance(30, &Unobserved)?;
+    let shown = shot.draw(&DisplayOptions::default(), &Unobserved)?.image; // 8 bits, sRGB
 
-    let shown = bansho::display(&frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
     let DisplayPixels::Eight(pixels) = &shown.pixels else { return Ok(()) };
     let mut text = String::new();
     for row in pixels.chunks(shown.width) {

@@ -188,7 +188,7 @@ pub use bansho_rain::RainParameters;
 #[doc(inline)]
 pub use bansho_render::{
     BufferLengthError, BuildErrors, ChannelError, CompiledScene, PhenomenonLight, Plan, PlanError, PlanOptions,
-    RenderError, Shot,
+    RenderError, SceneLinear, Shot, Target,
     display::{BitDepth, DisplayFrame, DisplayOptions, display},
     f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f, write_rgba32f,
 };
@@ -210,12 +210,11 @@ pub fn compile_scene(file: &str, text: &str, assets: Arc<dyn Assets>) -> Result<
     CompiledScene::build(scene, assets, None).map(Arc::new).map_err(|errors| errors.located(file, text))
 }
 
-/// Advances `shot` to frame `number` and draws it.
+/// Advances `shot` to frame `number` and draws it as scene-linear light. [`Shot::draw`] also draws display codes.
 ///
 /// # Errors
 /// The observer canceled the work, or a picture that the scene names cannot be read.
 pub fn draw(shot: &mut Shot, number: i64, observer: &dyn Observer) -> Result<Frame, RenderError> {
     shot.advance(number, observer)?;
-    shot.draw(observer)?;
-    Ok(shot.read().ok_or(Cancelled)?)
+    shot.draw(&SceneLinear, observer)
 }

@@ -330,9 +330,7 @@ fn lit_fraction(text: &str) -> f64 {
     let scene = Scene::parse("test.toml", text, KINDS).unwrap_or_else(|error| panic!("{error}"));
     let options = PlanOptions { size: Some([96, 54]), ..PlanOptions::default() };
     let mut shot = Planned::new(scene, &options, assets).open();
-    shot.advance(0, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    let frame = shot.read().unwrap();
+    let frame = bansho::draw(&mut shot, 0, &Unobserved).unwrap();
     let light: Vec<f32> = frame.beauty.pixels().iter().map(|pixel| pixel[1]).collect();
     light.iter().filter(|value| **value > 0.05).count() as f64 / light.len() as f64
 }

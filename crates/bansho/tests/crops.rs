@@ -25,9 +25,7 @@ fn draw(text: &str, frame: i64, crop: Option<Rect>) -> Frame {
     let scene = Scene::parse("scene.toml", text, KINDS).unwrap_or_else(|error| panic!("{error}"));
     let options = PlanOptions { size: Some(SIZE), crop, layers: true, aovs: true, ..PlanOptions::default() };
     let mut shot = Planned::new(scene, &options, assets).open();
-    shot.advance(frame, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    shot.read().unwrap()
+    bansho::draw(&mut shot, frame, &Unobserved).unwrap()
 }
 
 /// Every plane of a frame, by its name.

@@ -50,9 +50,7 @@ fn draw(text: &str, number: i64) -> Frame {
     let scene = Scene::parse("scene.toml", text, KINDS).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let options = PlanOptions { layers: true, aovs: true, ..PlanOptions::default() };
     let mut shot = Planned::new(scene, &options, Arc::new(MemoryAssets::default())).open();
-    shot.advance(number, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    shot.read().unwrap()
+    bansho::draw(&mut shot, number, &Unobserved).unwrap()
 }
 
 /// The names of the planes in which two frames differ.

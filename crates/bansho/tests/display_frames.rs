@@ -6,7 +6,7 @@ mod planned;
 
 use std::sync::Arc;
 
-use bansho::{AlphaConvention, BitDepth, DisplayFrame, DisplayOptions, KINDS, PlanOptions, View};
+use bansho::{AlphaConvention, BitDepth, DisplayOptions, KINDS, PlanOptions, Target, View};
 use bansho_base::{
     frame::DisplayPixels,
     host::{assets::MemoryAssets, observer::Unobserved},
@@ -43,13 +43,11 @@ fn assert_same(tables: &str, crop: Option<Rect>) -> usize {
     let scene = Scene::parse("scene.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}"));
     let options = PlanOptions { size: Some(SIZE), crop, ..PlanOptions::default() };
     let mut shot = Planned::new(scene, &options, Arc::new(MemoryAssets::default())).open();
-    shot.advance(3, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    let light = shot.read().unwrap();
+    let light = bansho::draw(&mut shot, 3, &Unobserved).unwrap();
     let mut shown = 0;
     for options in all_options() {
-        let drawn = shot.draw_display(&options, &Unobserved).unwrap();
-        let converted = DisplayFrame::of_frame(&mut light.clone(), &options);
+        let drawn = shot.draw(&options, &Unobserved).unwrap();
+        let converted = options.of_light(light.clone(), &mut None);
         assert!(drawn == converted, "{options:?} of {crop:?}\n{text}");
         if let DisplayPixels::Eight(pixels) = drawn.image.pixels {
             shown = pixels.iter().filter(|pixel| **pixel != [0; 4]).count();

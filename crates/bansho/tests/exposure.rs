@@ -46,9 +46,7 @@ fn plan(text: &str, assets: Arc<MemoryAssets>) -> Planned {
 
 fn frame(plan: Planned) -> Frame {
     let mut shot = plan.open();
-    shot.advance(1, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    shot.read().unwrap()
+    bansho::draw(&mut shot, 1, &Unobserved).unwrap()
 }
 
 /// Mean luminance of rows, 1.0 being display white.

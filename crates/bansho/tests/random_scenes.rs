@@ -90,9 +90,7 @@ fn draw(text: &str) -> bool {
     let compiled = Arc::new(compiled);
     let plan = Plan::new(&compiled, &options).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let mut shot = Shot::open(compiled, Arc::new(plan));
-    shot.advance(number, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    let frame = shot.read().unwrap();
+    let frame = bansho::draw(&mut shot, number, &Unobserved).unwrap();
     let channels = frame.channels.iter().flat_map(|channel| &channel.values);
     let mut values = frame.beauty.pixels().iter().flatten().chain(channels);
     assert!(values.all(|value| value.is_finite()), "{text}");

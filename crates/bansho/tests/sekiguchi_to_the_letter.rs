@@ -105,9 +105,7 @@ fn drawn(text: &str, size: usize, frame: i64) -> Vec<[f32; 3]> {
     let scene = Scene::parse("test.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}"));
     let options = PlanOptions { size: Some([size; 2]), ..PlanOptions::default() };
     let mut shot = Planned::new(scene, &options, Arc::new(MemoryAssets::default())).open();
-    shot.advance(frame, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    let frame = shot.read().unwrap();
+    let frame = bansho::draw(&mut shot, frame, &Unobserved).unwrap();
     frame.beauty.pixels().iter().map(|[red, green, blue, _]| srgb_from_acescg([*red, *green, *blue])).collect()
 }
 

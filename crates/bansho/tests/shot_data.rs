@@ -53,7 +53,7 @@ fn lights_are_those_that_phenomena_publish() {
         }
         assert_ne!(lights, previous, "flames flicker");
         // They do not depend on what was drawn.
-        shot.draw(&Unobserved).unwrap();
+        shot.draw(&bansho::SceneLinear, &Unobserved).unwrap();
         assert_eq!(shot.lights(), lights);
         previous = lights;
     }

@@ -37,9 +37,7 @@ fn draw_with(header: &str, tables: &[&str]) -> Frame {
     let text = format!("{header}{}", tables.concat());
     let scene = Scene::parse("scene.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let mut shot = Planned::new(scene, &PlanOptions::default(), Arc::new(MemoryAssets::default())).open();
-    shot.advance(3, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    shot.read().unwrap()
+    bansho::draw(&mut shot, 3, &Unobserved).unwrap()
 }
 
 /// The largest difference of a value, relative to the greatest one.
@@ -130,9 +128,7 @@ fn sparks_are_seen_from_above_and_in_the_wind() {
     let light = |more: &str| -> f32 {
         let scene = Scene::parse("scene.toml", &format!("{text}{more}"), KINDS).unwrap();
         let mut shot = Planned::new(scene, &PlanOptions::default(), Arc::new(MemoryAssets::default())).open();
-        shot.advance(50, &Unobserved).unwrap();
-        shot.draw(&Unobserved).unwrap();
-        shot.read().unwrap().beauty.pixels().iter().map(|pixel| pixel[1]).sum()
+        bansho::draw(&mut shot, 50, &Unobserved).unwrap().beauty.pixels().iter().map(|pixel| pixel[1]).sum()
     };
     // Rain that is hardly there is at all depths, and lets the sheet have slices before and behind it.
     let (alone, with_rain) = (light(""), light("[[rain]]\nrate_mm_per_h = 0\n"));

@@ -4,17 +4,23 @@ use bansho_base::{
     color::{AlphaConvention, AlphaMode, DisplayCode, View},
     frame::{DisplayEncoding, DisplayImage, DisplayPixels, Frame, FrameHeader, PhenomenonMetadata},
     host::observer::Cancelled,
+    image::Rect,
 };
 
 pub use bansho_base::color::BitDepth;
 
 use crate::{
-    composite::{composition::Composition, strips},
+    composite::{
+        composition::{Composition, STRIP_ROWS},
+        strips::{StripLight, StripPixels, draw_strips},
+    },
     pixels::{Background, CodeConversion, write_codes},
+    target::{Drawing, Target, sealed::Sealed},
 };
 
-/// How the light of a frame becomes display pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The target for display codes, and how light becomes display pixels. The default is that of `bansho render` for PNG files. A frame is converted strip by strip
+/// while it is drawn, so that its light is not in memory as a whole, unless hot air refracts it or the plan requests depth, layers or AOVs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DisplayOptions {
     /// The view transform.
     pub view: View,
@@ -37,51 +43,98 @@ pub struct DisplayFrame {
     pub metadata: Vec<PhenomenonMetadata>,
 }
 
-impl DisplayFrame {
-    /// The display pixels of a frame, which is laid over black where the options say so.
-    pub fn of_frame(frame: &mut Frame, options: &DisplayOptions) -> Self {
+impl Sealed for DisplayOptions {}
+
+impl Target for DisplayOptions {
+    type Frame = DisplayFrame;
+
+    fn of_light(&self, mut light: Frame, spare: &mut Option<Frame>) -> DisplayFrame {
         // Over black, premultiplied light is unchanged.
-        frame.opaque |= options.over_black;
-        let image = display(frame, &options.view, options.depth, options.alpha);
-        Self { header: frame.header.clone(), image, metadata: std::mem::take(&mut frame.metadata) }
+        light.opaque |= self.over_black;
+        let image = display(&light, &self.view, self.depth, self.alpha);
+        let (header, metadata) = (light.header.clone(), std::mem::take(&mut light.metadata));
+        *spare = Some(light);
+        DisplayFrame { header, image, metadata }
     }
 
-    /// Draws the composition of a frame with this header, and converts it strip by strip.
-    pub(crate) fn draw(
-        composition: &Composition,
-        header: FrameHeader,
-        options: &DisplayOptions,
-    ) -> Result<Self, Cancelled> {
-        let alpha = alpha_in(&options.view, options.alpha);
-        let opaque = composition.is_opaque() || options.over_black;
-        let conversion = CodeConversion::new(&header, &options.view, (!opaque).then_some(AlphaMode::Straight(alpha)));
-        let window = composition.view.window;
-        let (width, height) = (window.width, window.height);
-        let pixels = match options.depth {
-            BitDepth::Eight => DisplayPixels::Eight(drawn_codes(composition, &conversion)?),
-            BitDepth::Sixteen => DisplayPixels::Sixteen(drawn_codes(composition, &conversion)?),
-        };
-        let encoding = encoding_in(&options.view);
-        let image = DisplayImage { width, height, opaque, alpha, encoding, pixels };
-        Ok(Self { header, image, metadata: Vec::new() })
+    fn draw(&self, drawing: Drawing, recycled: &mut Option<Frame>) -> Result<DisplayFrame, Cancelled> {
+        if drawing.needs_light() {
+            let light = drawing.light(recycled.take())?;
+            return Ok(self.of_light(light, recycled));
+        }
+        let Drawing { composition, header, metadata, .. } = drawing;
+        let image = self.draw_image(composition, &header)?;
+        Ok(DisplayFrame { header, image, metadata })
     }
 }
 
-fn drawn_codes<C: DisplayCode + Send + Sync>(
+impl DisplayOptions {
+    /// Draws the composition of a frame with this header, and converts it strip by strip.
+    fn draw_image(&self, composition: &Composition, header: &FrameHeader) -> Result<DisplayImage, Cancelled> {
+        let alpha = self.view.alpha_convention(self.alpha);
+        let opaque = composition.is_opaque() || self.over_black;
+        let conversion = CodeConversion::new(header, &self.view, (!opaque).then_some(AlphaMode::Straight(alpha)));
+        let pixels = match self.depth {
+            BitDepth::Eight => DisplayPixels::Eight(draw_codes(composition, &conversion)?),
+            BitDepth::Sixteen => DisplayPixels::Sixteen(draw_codes(composition, &conversion)?),
+        };
+        let Rect { width, height, .. } = composition.view.window;
+        Ok(DisplayImage { width, height, opaque, alpha, encoding: encoding_in(&self.view), pixels })
+    }
+}
+
+/// Draws the codes of the whole window.
+fn draw_codes<C: DisplayCode + Send + Sync>(
     composition: &Composition,
     conversion: &CodeConversion,
 ) -> Result<Vec<[C; 4]>, Cancelled> {
     let window = composition.view.window;
     let mut codes = vec![[C::default(); 4]; window.width * window.height];
-    strips::draw_codes(composition, conversion, &mut codes)?;
+    let strips = codes.chunks_mut(STRIP_ROWS * window.width.max(1));
+    draw_strips(composition, strips.map(|codes| CodeStrip { codes, conversion, window }).collect())?;
     Ok(codes)
+}
+
+/// The display codes of a strip, row by row. They are zero where nothing is drawn, unless the picture is opaque.
+struct CodeStrip<'a, C> {
+    codes: &'a mut [[C; 4]],
+    conversion: &'a CodeConversion,
+    window: Rect,
+}
+
+impl<C> CodeStrip<'_, C> {
+    /// The pixels of which there is light: where anything is drawn, or all, since an opaque pixel without light has a code too.
+    fn converted_rect(&self, strip: Rect, drawn: Rect) -> Rect {
+        if self.conversion.is_opaque() { strip } else { drawn }
+    }
+}
+
+impl<C: DisplayCode + Send> StripPixels for CodeStrip<'_, C> {
+    fn light<'a>(&'a mut self, strip: Rect, drawn: Rect, buffer: &'a mut Vec<[f32; 4]>) -> StripLight<'a> {
+        let rect = self.converted_rect(strip, drawn);
+        buffer.resize(rect.width * rect.height, [0.0; 4]);
+        if rect != drawn {
+            buffer.fill([0.0; 4]);
+        }
+        StripLight { rect, beauty: buffer, depth: &mut [] }
+    }
+
+    fn convert(&mut self, strip: Rect, drawn: Rect, buffer: &[[f32; 4]]) {
+        let rect = self.converted_rect(strip, drawn);
+        for (row, light) in buffer.chunks_exact(rect.width.max(1)).enumerate() {
+            let y = rect.y + row;
+            let first = (y - strip.y) * strip.width + rect.x - strip.x;
+            let codes = &mut self.codes[first..][..rect.width];
+            self.conversion.row(y - self.window.y, rect.x - self.window.x, light, codes);
+        }
+    }
 }
 
 /// The frame's beauty as display pixels: white balance of the camera, view transform, straight alpha in the convention `alpha`, sRGB
 /// encoding, dither. The view `raw` encodes nothing, so its alpha is linear. Values below 0 and NaN become 0, in alpha too; infinity becomes
 /// the brightest value.
 pub fn display(frame: &Frame, view: &View, depth: BitDepth, alpha: AlphaConvention) -> DisplayImage {
-    let alpha = alpha_in(view, alpha);
+    let alpha = view.alpha_convention(alpha);
     let pixels = match depth {
         BitDepth::Eight => DisplayPixels::Eight(codes(frame, view, alpha)),
         BitDepth::Sixteen => DisplayPixels::Sixteen(codes(frame, view, alpha)),
@@ -90,18 +143,13 @@ pub fn display(frame: &Frame, view: &View, depth: BitDepth, alpha: AlphaConventi
     DisplayImage { width, height, opaque: frame.opaque, alpha, encoding: encoding_in(view), pixels }
 }
 
-/// The convention of alpha in this view: `raw` encodes nothing, so its alpha is linear.
-fn alpha_in(view: &View, alpha: AlphaConvention) -> AlphaConvention {
-    if *view == View::RAW { AlphaConvention::Linear } else { alpha }
-}
-
 /// What the codes of this view stand for.
 fn encoding_in(view: &View) -> DisplayEncoding {
     if *view == View::RAW { DisplayEncoding::LinearAcescg } else { DisplayEncoding::Srgb }
 }
 
 /// Display codes of the pixels, in rows.
-pub(crate) fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View, alpha: AlphaConvention) -> Vec<[C; 4]> {
+fn codes<C: DisplayCode + Send + Sync>(frame: &Frame, view: &View, alpha: AlphaConvention) -> Vec<[C; 4]> {
     let mut pixels = vec![[C::default(); 4]; frame.beauty.pixels().len()];
     write_codes(frame, view, AlphaMode::Straight(alpha), Background::IsZero, &mut pixels);
     pixels

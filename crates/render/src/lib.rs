@@ -1,7 +1,8 @@
 //! From a scene to frames: compiling, planning, drawing a shot.
 //!
 //! [`CompiledScene`] builds what the scene contains, once; [`Plan`] fixes everything before the first frame; [`Shot`] steps simulations and
-//! draws frames; [`display`](mod@display) applies the view transform for display formats, and [`pixels`] writes frames into buffers of the caller.
+//! draws frames as scene-linear light or as display codes, by its [`Target`]; [`display`](mod@display) has the view transform, and [`pixels`] writes frames into buffers
+//! of the caller.
 
 pub mod compiled;
 mod composite;
@@ -17,6 +18,7 @@ mod planning;
 mod plate_boxes;
 pub mod remarks;
 pub mod shot;
+pub mod target;
 
 pub use compiled::{BuildErrors, CompiledScene};
 pub use pixels::{
@@ -25,3 +27,4 @@ pub use pixels::{
 };
 pub use plan::{Plan, PlanError, PlanOptions};
 pub use shot::{PhenomenonLight, RenderError, Shot, snapshot};
+pub use target::{SceneLinear, Target};

@@ -6,7 +6,7 @@ use bansho_base::{
     camera::CameraParameters, frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved,
     tables::PhenomenonTable,
 };
-use bansho_render::{PhenomenonLight, Shot};
+use bansho_render::{PhenomenonLight, SceneLinear, Shot};
 
 use super::{EffectError, Picture, pool::Pool};
 
@@ -182,10 +182,7 @@ impl LiveEffect {
             Some(frame) => frame,
             None => {
                 let shot = &mut self.shot;
-                self.pool.run(|| {
-                    shot.draw(&Unobserved)?;
-                    shot.read().ok_or(bansho_render::RenderError::from(bansho_base::host::observer::Cancelled))
-                })?
+                self.pool.run(|| shot.draw(&SceneLinear, &Unobserved))?
             }
         };
         let (time_s, owed_s) = (self.shot.time(), self.owed_s);

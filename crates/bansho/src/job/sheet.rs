@@ -4,6 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use bansho_base::{frame::Frame, host::observer::Observer};
 use bansho_media::imageops::sprite_sheet::SheetLayout;
+use bansho_render::SceneLinear;
 
 use super::{
     error::{JobError, OptionError, SheetKind},
@@ -50,6 +51,12 @@ impl<'a, T, M: Fn(&mut Frame, &dyn Observer) -> T> TileCollector<'a, T, M> {
 }
 
 impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> FrameSink for TileCollector<'_, T, M> {
+    type Target = SceneLinear;
+
+    fn target(&self) -> &SceneLinear {
+        &SceneLinear
+    }
+
     fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
         let number = frame.header.number;
         let tile = (self.make_tile)(frame, observer);

@@ -15,7 +15,7 @@ use bansho_base::{
     phenomenon::SnapshotError,
 };
 use bansho_media::files::provenance;
-use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError};
+use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError, SceneLinear, Target};
 
 use super::{
     error::JobError,
@@ -37,13 +37,12 @@ pub(crate) struct CountingSource {
     plan: Arc<Plan>,
     pub(crate) steps: usize,
     pub(crate) number: i64,
-    drawn: bool,
 }
 
 impl CountingSource {
     pub(crate) fn new() -> Self {
         let plan = plan();
-        Self { number: plan.frames().start - 1, plan, steps: 0, drawn: false }
+        Self { number: plan.frames().start - 1, plan, steps: 0 }
     }
 }
 
@@ -58,14 +57,9 @@ impl FrameSource for CountingSource {
         Ok(())
     }
 
-    fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
+    fn draw<T: Target>(&mut self, target: &T, observer: &dyn Observer) -> Result<T::Frame, RenderError> {
         check(observer)?;
-        self.drawn = true;
-        Ok(())
-    }
-
-    fn read(&mut self) -> Option<Frame> {
-        std::mem::take(&mut self.drawn).then(|| blank(&self.plan, self.number))
+        Ok(target.of_light(blank(&self.plan, self.number), &mut None))
     }
 
     fn recycle(&mut self, _recycled: Frame) {}
@@ -135,6 +129,12 @@ pub(crate) struct FunctionSink<F> {
 }
 
 impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> FrameSink for FunctionSink<F> {
+    type Target = SceneLinear;
+
+    fn target(&self) -> &SceneLinear {
+        &SceneLinear
+    }
+
     fn finish(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         (self.each)(index, frame.header.number)
     }

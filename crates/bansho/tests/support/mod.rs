@@ -77,9 +77,7 @@ pub(crate) fn looped(text: &str, seconds: f64) -> Result<Planned, String> {
 }
 
 pub(crate) fn draw(shot: &mut Shot, number: i64) -> Frame {
-    shot.advance(number, &Unobserved).unwrap();
-    shot.draw(&Unobserved).unwrap();
-    shot.read().unwrap()
+    bansho::draw(shot, number, &Unobserved).unwrap()
 }
 
 pub(crate) fn render(text: &str, options: &PlanOptions, number: i64) -> Frame {

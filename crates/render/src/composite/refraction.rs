@@ -9,7 +9,7 @@ use bansho_base::{
     phenomenon::Deflection,
 };
 
-use super::{background::Background, composition::Composition, strips};
+use super::{background::Background, composition::Composition, light_frame};
 
 /// Draws and composites the whole window, with refraction.
 pub(crate) fn draw_frame(
@@ -24,7 +24,7 @@ pub(crate) fn draw_frame(
     let (mut slices, far) = composition.slices.split_at(slices_before(composition, farthest));
     let mut drawn = match far {
         [] => None,
-        far => Some(strips::draw_frame(&Composition { slices: far, ..*composition }, header.clone(), None)?),
+        far => Some(light_frame::draw_frame(&Composition { slices: far, ..*composition }, header.clone(), None)?),
     };
     for (index, layer) in layers.iter().enumerate() {
         let next = layers.get(index + 1).map_or(f64::NEG_INFINITY, |next| next.depth);
@@ -34,11 +34,11 @@ pub(crate) fn draw_frame(
         let background = background.through(*layer, composition.view);
         let group = Composition { slices: group, background, ..*composition };
         let memory = if rest.is_empty() { recycled.take() } else { None };
-        drawn = Some(strips::draw_frame(&group, header.clone(), memory)?);
+        drawn = Some(light_frame::draw_frame(&group, header.clone(), memory)?);
     }
     match drawn {
         Some(frame) => Ok(frame),
-        None => strips::draw_frame(composition, header, recycled),
+        None => light_frame::draw_frame(composition, header, recycled),
     }
 }
 

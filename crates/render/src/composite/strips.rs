@@ -1,8 +1,7 @@
-//! From prepared phenomena to a frame: each strip composites its slices from near to far, then adds the background.
+//! From prepared phenomena to pixels: each strip composites its slices from near to far, then adds the background.
 
 use bansho_base::{
-    color::DisplayCode,
-    frame::{Frame, FrameHeader},
+    frame::Channel,
     host::{
         observer::{self, Cancelled},
         parallel::prelude::*,
@@ -14,111 +13,66 @@ use fearless_simd::{Level, dispatch};
 
 use super::{
     channels::{channel_planes, channels},
-    composition::{Composition, STRIP_ROWS, StripScratch},
-    frame_memory::{FrameMemory, StripPixels},
+    composition::{Composition, StripScratch},
 };
-use crate::pixels::CodeConversion;
 
-/// Draws and composites the whole window.
-pub(crate) fn draw_frame(
-    composition: &Composition,
-    header: FrameHeader,
-    recycled: Option<Frame>,
-) -> Result<Frame, Cancelled> {
-    let window = composition.view.window;
-    let level = bansho_base::math::simd::level();
-    let mut memory = FrameMemory::new(window, composition.outputs.depth, recycled);
-    let scratches = composition.scratches;
-    let has_channels = composition.outputs.layers || composition.outputs.aovs;
-    let strips = memory.strips(STRIP_ROWS).into_par_iter().enumerate().with_max_len(1).map(|(index, mut pixels)| {
-        observer::check(composition.observer)?;
-        let _part = composition.begin_part(None);
-        pixels.clear();
-        let strip = composition.strip_rect(index);
-        let rect = composition.nonempty_rect(strip);
-        if rect.is_empty() {
-            return Ok(Vec::new());
-        }
-        scratches.with(|scratch| {
-            let StripPixels { beauty, depth, .. } = &mut pixels;
-            draw_strip(composition, level, rect, scratch, StripLight { rect: strip, beauty, depth });
-            Ok(if has_channels { channel_planes(composition, scratch) } else { Vec::new() })
-        })
-    });
-    let planes: Vec<Vec<Vec<f32>>> = if has_channels {
-        strips.collect::<Result<_, Cancelled>>()?
-    } else {
-        strips.try_for_each(|planes| planes.map(|_| ()))?;
-        Vec::new()
-    };
-    Ok(Frame {
-        header,
-        beauty: memory.beauty,
-        depth: memory.depth,
-        channels: channels(composition, planes),
-        opaque: composition.is_opaque(),
-        content: composition.content(),
-        metadata: Vec::new(),
-    })
+/// The pixels of a strip, in the format that the picture is kept in.
+pub(crate) trait StripPixels: Send {
+    /// Memory for the light of `strip`, of which the rectangle `drawn` will be overwritten. The other pixels of the memory are empty. A format that does not
+    /// keep light returns `buffer`.
+    fn light<'a>(&'a mut self, strip: Rect, drawn: Rect, buffer: &'a mut Vec<[f32; 4]>) -> StripLight<'a>;
+
+    /// Converts the light, which is now in the memory that [`light`](Self::light) returned for the same rectangles.
+    fn convert(&mut self, strip: Rect, drawn: Rect, buffer: &[[f32; 4]]);
 }
 
-/// Draws and composites the whole window as display codes: each strip is converted while it is in the cache, and its light is not kept.
-///
-/// `codes` are zero, and remain so where nothing is drawn, unless the picture is opaque.
-pub(crate) fn draw_codes<C: DisplayCode + Send + Sync>(
-    composition: &Composition,
-    conversion: &CodeConversion,
-    codes: &mut [[C; 4]],
-) -> Result<(), Cancelled> {
-    let window = composition.view.window;
-    let level = bansho_base::math::simd::level();
-    let strips = codes.par_chunks_mut(STRIP_ROWS * window.width.max(1)).enumerate().with_max_len(1);
-    strips.try_for_each(|(index, codes)| {
-        observer::check(composition.observer)?;
-        let _part = composition.begin_part(None);
-        let strip = composition.strip_rect(index);
-        let rect = composition.nonempty_rect(strip);
-        // An opaque pixel without light has a code too.
-        let converted = if conversion.is_opaque() { strip } else { rect };
-        if converted.is_empty() {
-            return Ok(());
-        }
-        composition.scratches.with(|scratch| {
-            let mut light = std::mem::take(&mut scratch.light);
-            light.resize(converted.width * converted.height, [0.0; 4]);
-            if converted != rect {
-                light.fill([0.0; 4]);
-            }
-            if !rect.is_empty() {
-                let pixels = StripLight { rect: converted, beauty: &mut light, depth: &mut [] };
-                draw_strip(composition, level, rect, scratch, pixels);
-            }
-            for (row, light) in light.chunks_exact(converted.width).enumerate() {
-                let y = converted.y + row;
-                let first = (y - strip.y) * strip.width + converted.x - strip.x;
-                conversion.row(y - window.y, converted.x - window.x, light, &mut codes[first..][..converted.width]);
-            }
-            scratch.light = light;
-        });
-        Ok(())
-    })
-}
-
-/// Where the light of a strip goes.
-struct StripLight<'a> {
+/// The light of a strip.
+pub(crate) struct StripLight<'a> {
     /// The pixels, in pixels of the picture.
-    rect: Rect,
+    pub(crate) rect: Rect,
     /// Color and alpha, row by row.
-    beauty: &'a mut [[f32; 4]],
+    pub(crate) beauty: &'a mut [[f32; 4]],
     /// Depth, m; empty if it is not kept.
-    depth: &'a mut [f32],
+    pub(crate) depth: &'a mut [f32],
 }
 
-/// Draws and composites the pixels `rect` of a strip.
-fn draw_strip(composition: &Composition, level: Level, rect: Rect, scratch: &mut StripScratch, pixels: StripLight) {
-    composition.accumulate(level, rect, scratch);
-    composition.background.trace(rect, &mut scratch.bent);
-    finish_strip(composition, level, scratch, pixels);
+/// Draws and composites the whole window into its strips of [`STRIP_ROWS`](super::composition::STRIP_ROWS) rows from the top. Each is converted while its light is in the cache. Returns the
+/// channels of layers and AOVs.
+pub(crate) fn draw_strips<P: StripPixels>(
+    composition: &Composition,
+    strips: Vec<P>,
+) -> Result<Vec<Channel>, Cancelled> {
+    let level = bansho_base::math::simd::level();
+    let has_channels = composition.outputs.layers || composition.outputs.aovs;
+    let draw_strip = |(index, mut pixels): (usize, P)| {
+        observer::check(composition.observer)?;
+        let _part = composition.begin_part(None);
+        let strip = composition.strip_rect(index);
+        let drawn = composition.nonempty_rect(strip);
+        composition.scratches.with(|scratch| {
+            let mut buffer = std::mem::take(&mut scratch.light);
+            let light = pixels.light(strip, drawn, &mut buffer);
+            let mut planes = Vec::new();
+            if !drawn.is_empty() {
+                composition.accumulate(level, drawn, scratch);
+                composition.background.trace(drawn, &mut scratch.bent);
+                finish_strip(composition, level, scratch, light);
+                if has_channels {
+                    planes = channel_planes(composition, scratch);
+                }
+            }
+            pixels.convert(strip, drawn, &buffer);
+            scratch.light = buffer;
+            Ok(planes)
+        })
+    };
+    let strips = strips.into_par_iter().enumerate().with_max_len(1).map(draw_strip);
+    if !has_channels {
+        // Collecting would allocate memory for each strip.
+        strips.try_for_each(|planes| planes.map(|_| ()))?;
+        return Ok(Vec::new());
+    }
+    Ok(channels(composition, strips.collect::<Result<_, Cancelled>>()?))
 }
 
 /// Exposes a strip, computes its alpha, and composites the background behind it.

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    color::{AlphaConvention, View},
-    host::observer::{Cancelled, Unobserved},
+    color::{AlphaConvention, BitDepth, View},
+    frame::DisplayPixels,
+    host::observer::Unobserved,
 };
 
 use crate::{
     compiled::CompiledScene,
-    display,
+    display::DisplayOptions,
     plan::Plan,
     shot::{RenderError, Shot},
 };
@@ -80,10 +81,15 @@ pub(crate) fn thumbnail_plan(plan: &Plan) -> Plan {
 /// Display codes of a frame over black, from 0 to 1.
 pub(crate) fn draw_thumbnail(shot: &mut Shot, number: i64) -> Result<Vec<f64>, RenderError> {
     shot.advance(number, &Unobserved)?;
-    shot.draw(&Unobserved)?;
-    let frame = shot.read().ok_or(Cancelled)?;
-    let codes = display::codes::<u16>(&frame, &View::DISPLAY, AlphaConvention::Linear).into_iter();
+    let target = DisplayOptions {
+        view: View::DISPLAY,
+        depth: BitDepth::Sixteen,
+        alpha: AlphaConvention::Linear,
+        over_black: false,
+    };
+    let DisplayPixels::Sixteen(codes) = shot.draw(&target, &Unobserved)?.image.pixels else { return Ok(Vec::new()) };
     Ok(codes
+        .into_iter()
         .flat_map(|[r, g, b, alpha]| [r, g, b].map(|code| f64::from(code) * f64::from(alpha) * CODE_STEP * CODE_STEP))
         .collect())
 }

@@ -37,7 +37,6 @@ impl Shot {
         let wind = self.context.wind.clone();
         self.context = ShotContext::new(self.context.compiled.clone(), plan);
         self.context.wind = wind;
-        self.frame = None;
     }
 
     fn continue_with(&mut self, compiled: Arc<CompiledScene>, plan: Arc<Plan>, is_same_scene: bool) {
@@ -59,7 +58,6 @@ impl Shot {
         self.has_earlier_state |= !wind.is_planned();
         self.context = ShotContext::new(compiled, plan);
         self.context.wind = wind;
-        self.frame = None;
     }
 
     /// The wind with which the shot continues in another scene: a changed wind blows from now on, as if it had been changed live, so that nothing jumps.

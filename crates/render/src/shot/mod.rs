@@ -1,7 +1,8 @@
-//! A shot: the runs of all phenomena of a compiled scene, and the last frame.
+//! A shot: the runs of all phenomena of a compiled scene, at a frame.
 
 mod continuing;
 mod data;
+mod draw;
 mod reflection;
 pub mod snapshot;
 pub(crate) mod stepping;
@@ -9,12 +10,11 @@ pub(crate) mod stepping;
 use std::{collections::HashSet, sync::Arc};
 
 use bansho_base::{
-    frame::{Channel, Frame, FrameHeader, PhenomenonMetadata},
+    frame::Frame,
     host::{
-        observer::{self, Cancelled, Observer, PartGuard, Stage, StageGuard, StagePart},
+        observer::{Cancelled, Observer, PartGuard, Stage, StageGuard, StagePart},
         parallel::prelude::*,
     },
-    image::Rect,
     math::DVec3,
     parameters::BuildError,
     phenomenon::{
@@ -28,24 +28,17 @@ use bansho_base::{
 use crate::{
     compiled::{ActiveRun, CompiledScene},
     composite::{
-        background::Background,
-        composition::{self, Composition, Outputs, StripScratches},
-        hiding::HidingDepth,
+        composition::{self, StripScratches},
         mirror::Mirror,
-        plate::PlateFrame,
         plate_cache::PlateCache,
-        refraction,
         slices::{self, Slice},
-        strips,
     },
     context::ShotContext,
-    display::{DisplayFrame, DisplayOptions},
     exposure_parts::{self, ExposurePart},
     plan::Plan,
 };
 
 pub use data::PhenomenonLight;
-use reflection::SceneMirror;
 
 /// Why a frame cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -64,7 +57,7 @@ pub enum RenderError {
     ForeignSnapshot,
 }
 
-/// A shot that is being drawn: [`advance`](Self::advance) to a frame, [`draw`](Self::draw) it, [`read`](Self::read) it.
+/// A shot that is being drawn: [`advance`](Self::advance) to a frame, [`draw`](Self::draw) it.
 ///
 /// It runs on the CPU, in the rayon pool of the caller, or on its thread (see [`bansho_base::host::parallel`]). The same scene and plan give the same bytes with any number of threads.
 pub struct Shot {
@@ -77,7 +70,6 @@ pub struct Shot {
     time: f64,
     /// Whether the state was simulated, at least partly, with an earlier scene.
     has_earlier_state: bool,
-    frame: Option<Frame>,
     /// A frame whose memory the next one reuses.
     recycled: Option<Frame>,
     scratches: StripScratches,
@@ -93,7 +85,6 @@ impl Shot {
             context: ShotContext::new(compiled, plan),
             plates: PlateCache::default(),
             has_earlier_state: false,
-            frame: None,
             recycled: None,
             scratches: composition::scratches(),
         }
@@ -151,7 +142,6 @@ impl Shot {
         self.runs = self.context.compiled.start();
         self.has_earlier_state = false;
         self.context.wind = self.context.compiled.wind().clone();
-        self.frame = None;
     }
 
     /// Time at which the frame begins that the shot was advanced to, s.
@@ -174,97 +164,10 @@ impl Shot {
 
     fn step_to(&mut self, t: f64, max_steps: u64, observer: &dyn Observer) -> Result<(), RenderError> {
         let _stage = StageGuard::begin(observer, Stage::Advance);
-        self.frame = None;
         let shutter = self.context.plan.shutter_at(t);
         stepping::advance(&self.context, &mut self.runs, shutter, max_steps, observer)?;
         self.time = t;
         Ok(())
-    }
-
-    /// Draws the frame that the shot was advanced to.
-    ///
-    /// # Errors
-    /// The observer asked to stop, or the plate cannot be read.
-    pub fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
-        let recycled = self.recycled.take();
-        let frame = self.draw_with(
-            |composition, header, is_refracted| draw_light(composition, header, is_refracted, recycled),
-            |frame| frame,
-            observer,
-        )?;
-        self.frame = Some(Frame { metadata: frame.metadata, ..frame.picture });
-        Ok(())
-    }
-
-    /// Draws the frame that the shot was advanced to as display pixels, without keeping its light: in less memory than [`draw`](Self::draw), and with the
-    /// bytes of [`display`](crate::display::display).
-    ///
-    /// # Errors
-    /// The observer asked to stop, or the plate cannot be read.
-    pub fn draw_display(
-        &mut self,
-        options: &DisplayOptions,
-        observer: &dyn Observer,
-    ) -> Result<DisplayFrame, RenderError> {
-        let mut memory = self.recycled.take();
-        let drawn = self.draw_with(
-            |composition, header, is_refracted| {
-                if !is_refracted && !composition.outputs.needs_light() {
-                    return DisplayFrame::draw(composition, header, options);
-                }
-                let mut frame = draw_light(composition, header, is_refracted, memory.take())?;
-                let display = DisplayFrame::of_frame(&mut frame, options);
-                memory = Some(frame);
-                Ok(display)
-            },
-            |mut frame| DisplayFrame::of_frame(&mut frame, options),
-            observer,
-        );
-        self.recycled = memory;
-        let Drawn { picture, metadata } = drawn?;
-        Ok(DisplayFrame { metadata, ..picture })
-    }
-
-    /// Draws the frame by `draw`, which is told whether light is refracted, or, where the whole picture must be drawn for its window, makes a
-    /// picture of the window by `of_window`.
-    fn draw_with<T>(
-        &mut self,
-        draw: impl FnOnce(&Composition, FrameHeader, bool) -> Result<T, Cancelled>,
-        of_window: impl FnOnce(Frame) -> T,
-        observer: &dyn Observer,
-    ) -> Result<Drawn<T>, RenderError> {
-        let plate = {
-            let _stage = StageGuard::begin(observer, Stage::Load);
-            let ShotContext { compiled, plan, .. } = &self.context;
-            let plate = self.plates.frame(compiled, plan, self.number);
-            plate.map_err(|error| RenderError::Plate(Box::new(error)))?
-        };
-        let view = self.context.plan.view_at(self.time);
-        let preparing = StageGuard::begin(observer, Stage::Prepare);
-        let publications = self.publications(view.shutter, observer);
-        let mirrored = match self.mirror(&view, &publications) {
-            Some(SceneMirror { mirror, pixel_size, .. }) => {
-                self.plates.mirrored(&self.context.plan, mirror, pixel_size, observer)?
-            }
-            None => Arc::default(),
-        };
-        drop(preparing);
-        let pictures = FramePictures { plate: &plate, mirrored: &mirrored, publications: &publications };
-        if let Some(drawn) = self.compose(&view, pictures, draw, observer)? {
-            return Ok(drawn);
-        }
-        let whole = Rect::from_size(view.size[0], view.size[1]);
-        let view = view.with_window(whole);
-        let draw_whole =
-            |composition: &Composition, header, is_refracted| draw_light(composition, header, is_refracted, None);
-        let whole = self.compose(&view, pictures, draw_whole, observer)?.ok_or(Cancelled)?;
-        let window = crop(whole.picture, self.context.plan.window).ok_or(Cancelled)?;
-        Ok(Drawn { picture: of_window(window), metadata: whole.metadata })
-    }
-
-    /// Takes the frame that was drawn; `None` if none was drawn since the last call.
-    pub fn read(&mut self) -> Option<Frame> {
-        self.frame.take()
     }
 
     /// Gives back a frame that is no longer needed, so that the next one is drawn into its memory.
@@ -305,59 +208,9 @@ impl Shot {
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError> {
         let mut runs = self.context.compiled.start();
         snapshot::read(&self.context.compiled, snapshot, &mut runs)?;
-        (self.runs, self.has_earlier_state, self.frame) = (runs, false, None);
+        (self.runs, self.has_earlier_state) = (runs, false);
         self.context.wind = self.context.compiled.wind().clone();
         Ok(())
-    }
-
-    /// Draws the view by `draw`. `None` if the window is not the whole picture and light is refracted: it may come from outside the window, so the whole
-    /// picture must be drawn and cropped.
-    fn compose<T>(
-        &self,
-        view: &View,
-        FramePictures { plate, mirrored, publications }: FramePictures,
-        draw: impl FnOnce(&Composition, FrameHeader, bool) -> Result<T, Cancelled>,
-        observer: &dyn Observer,
-    ) -> Result<Option<Drawn<T>>, RenderError> {
-        let preparing = StageGuard::begin(observer, Stage::Prepare);
-        let reflection = self.reflection(view, mirrored, publications, observer)?;
-        let surroundings = self.surroundings(view, publications, reflection.as_ref());
-        let all: Vec<usize> = (0..self.runs.len()).collect();
-        let runs: Vec<&ActiveRun> = self.runs.iter().collect();
-        let parts = self.exposure_parts(&all, view, &surroundings, publications);
-        let inputs = PreparationInputs { view, surroundings: &surroundings, parts: &parts, is_mirrored: false };
-        let PreparedSlices { slices, prepared } = self.prepare(&all, inputs, observer)?;
-        drop(preparing);
-        let _stage = StageGuard::begin(observer, Stage::Draw);
-        observer::check(observer)?;
-        // Only what is behind refracting air is refracted.
-        let has_background = plate.color.is_some() || self.runs.len() > 1;
-        let is_whole = view.window == Rect::from_size(view.size[0], view.size[1]);
-        // Also if nothing in the window is refracted: compositing in groups of slices rounds all pixels differently.
-        if !is_whole && has_background && prepared.iter().any(|prepared| prepared.may_refract()) {
-            return Ok(None);
-        }
-        let is_refracted = has_background && prepared.iter().any(|prepared| prepared.deflection().is_some());
-        let outputs = Outputs::of_plan(&self.context.plan);
-        let through = HidingDepth::through(&prepared, plate);
-        let composition = Composition {
-            // What is nearer than refracting air is not refracted.
-            outputs: Outputs { depth: outputs.depth || is_refracted, ..outputs },
-            is_mirrored: false,
-            observer,
-            view,
-            runs: &runs,
-            prepared: &prepared,
-            slices: &slices,
-            plate,
-            hiding: &HidingDepth::new(&prepared, plate),
-            through: through.as_ref(),
-            background: Background::plate(plate),
-            scratches: &self.scratches,
-        };
-        let picture = draw(&composition, self.context.header(self.number, self.time), is_refracted)?;
-        let metadata = if self.context.plan.metadata { self.metadata(&prepared) } else { Vec::new() };
-        Ok(Some(Drawn { picture, metadata }))
     }
 
     /// What each phenomenon publishes during `shutter`.
@@ -367,15 +220,6 @@ impl Shot {
             run.run.publish(shutter)
         };
         self.runs.par_iter().map(publish).collect()
-    }
-
-    /// The metadata of every phenomenon that has any.
-    fn metadata(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<PhenomenonMetadata> {
-        let names = self.runs.iter().map(|run| run.info().name.to_owned());
-        let each = names.zip(prepared.iter().map(|prepared| prepared.metadata()));
-        each.filter(|(_, entries)| !entries.is_empty())
-            .map(|(phenomenon, entries)| PhenomenonMetadata { phenomenon, entries })
-            .collect()
     }
 
     /// Prepares the phenomena with the indices `which`, and cuts them into slices, whose members are positions in `which`.
@@ -526,53 +370,8 @@ fn begin_preparation<'a>(run: &'a ActiveRun, is_mirrored: bool, observer: &'a dy
     PartGuard::begin(observer, StagePart { stage: Stage::Prepare, phenomenon, is_mirrored })
 }
 
-/// What a frame is drawn from, besides the state of the simulations.
-#[derive(Clone, Copy)]
-struct FramePictures<'a> {
-    plate: &'a PlateFrame,
-    /// The plate as seen in the mirror.
-    mirrored: &'a PlateFrame,
-    publications: &'a [Publication],
-}
-
-/// A picture that was drawn, of light or of display pixels.
-struct Drawn<T> {
-    picture: T,
-    metadata: Vec<PhenomenonMetadata>,
-}
-
-/// Draws a composition as scene-linear light, in the memory of an earlier frame.
-fn draw_light(
-    composition: &Composition,
-    header: FrameHeader,
-    is_refracted: bool,
-    recycled: Option<Frame>,
-) -> Result<Frame, Cancelled> {
-    let draw = if is_refracted { refraction::draw_frame } else { strips::draw_frame };
-    draw(composition, header, recycled)
-}
-
 /// Slices of depth, and the prepared phenomena to which their members refer.
 struct PreparedSlices<'a> {
     slices: Vec<Slice>,
     prepared: Vec<Box<dyn Prepared + 'a>>,
-}
-
-/// The region `window` of a whole frame.
-fn crop(whole: Frame, window: Rect) -> Option<Frame> {
-    let width = whole.beauty.width();
-    let plane = |values: &[f32]| -> Vec<f32> {
-        let row = |y| values[y * width + window.x..][..window.width].iter().copied();
-        (window.y..window.bottom()).flat_map(row).collect()
-    };
-    let channels = whole.channels.iter().map(|channel| Channel { values: plane(&channel.values), ..channel.clone() });
-    Some(Frame {
-        beauty: whole.beauty.crop(window)?,
-        depth: whole.depth.as_deref().map(plane),
-        channels: channels.collect(),
-        header: whole.header,
-        opaque: whole.opaque,
-        metadata: whole.metadata,
-        content: Rect::from_size(window.width, window.height),
-    })
 }

@@ -17,9 +17,9 @@ use crate::{
         background::Background,
         composition::{Composition, Outputs},
         hiding::HidingDepth,
+        light_frame,
         mirror::{self, BACKDROP_SAMPLE, Mirror},
         plate::PlateFrame,
-        strips,
     },
 };
 
@@ -109,6 +109,6 @@ impl Shot {
             scratches: &self.scratches,
         };
         let header = self.context.header(self.number, self.time);
-        Ok(strips::draw_frame(&composition, header, None)?.beauty)
+        Ok(light_frame::draw_frame(&composition, header, None)?.beauty)
     }
 }

@@ -3,9 +3,8 @@
 use std::{path::Path, sync::Arc};
 
 use bansho::{
-    AlphaConvention, Assets, BitDepth, DisplayImage, Observer, RenderError, Shot, View,
-    base::frame::{DisplayPixels, Frame},
-    display,
+    AlphaConvention, Assets, BitDepth, DisplayFrame, DisplayImage, DisplayOptions, Observer, RenderError, Shot, View,
+    base::frame::DisplayPixels,
     media::{
         MediaError,
         png::{self, PngEffort},
@@ -135,10 +134,8 @@ impl Engine {
             Some(open) => open,
             None => (scene.clone(), Shot::open(scene.compiled.clone(), scene.plan.clone())),
         });
-        let frame = bansho::draw(shot, number, observer)?;
-        let png = encode_png(&frame);
-        shot.recycle(frame);
-        Ok(png?)
+        shot.advance(number, observer)?;
+        Ok(encode_png(&shot.draw(&STILL, observer)?)?)
     }
 
     fn draw(
@@ -169,10 +166,7 @@ impl OpenShot {
         shot.advance(number, observer)?;
         snapshots.iter_mut().for_each(|snapshots| snapshots.store(&scene.compiled, shot, number));
         let advanced = Instant::now();
-        shot.draw(observer)?;
-        let mut frame = shot.read().ok_or(RenderError::Cancelled(bansho::Cancelled))?;
-        let pixels = to_display_pixels(&mut frame);
-        shot.recycle(frame);
+        let pixels = eight_bits(shot.draw(&PREVIEW, observer)?.image);
         Ok(Picture {
             revision: request.revision,
             number,
@@ -242,28 +236,29 @@ fn fit_within(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
     size.map(|side| ((side as f64 * scale).round() as usize).max(1))
 }
 
-/// The frame composited over black as display pixels: premultiplied color over black is the color itself.
-fn to_display_pixels(frame: &mut Frame) -> Vec<[u8; 4]> {
-    let opaque = std::mem::replace(&mut frame.opaque, true);
-    let DisplayImage { pixels, .. } = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
-    frame.opaque = opaque;
-    match pixels {
+/// A still as `bansho render` draws it for a PNG by default.
+const STILL: DisplayOptions =
+    DisplayOptions { view: View::DISPLAY, depth: BitDepth::Eight, alpha: AlphaConvention::Encoded, over_black: false };
+
+/// A picture of the preview.
+const PREVIEW: DisplayOptions = DisplayOptions { over_black: true, ..STILL };
+
+/// The pixels of a picture with 8 bits.
+fn eight_bits(image: DisplayImage) -> Vec<[u8; 4]> {
+    match image.pixels {
         DisplayPixels::Eight(pixels) => pixels,
         DisplayPixels::Sixteen(pixels) => pixels.into_iter().map(|pixel| pixel.map(|code| (code >> 8) as u8)).collect(),
     }
 }
 
 /// The frame as a PNG with the default options of `bansho render`.
-fn encode_png(frame: &Frame) -> Result<Vec<u8>, MediaError> {
-    let image = display(frame, &View::DISPLAY, BitDepth::Eight, AlphaConvention::Encoded);
-    let fingerprint = fingerprint::of_png(frame.header.fingerprint, BitDepth::Eight, AlphaConvention::Encoded);
-    png::encode(&image, &fingerprint, PngEffort::default(), Path::new("still.png"))
+fn encode_png(frame: &DisplayFrame) -> Result<Vec<u8>, MediaError> {
+    let fingerprint = fingerprint::of_png(frame.header.fingerprint, STILL.depth, STILL.alpha);
+    png::encode(&frame.image, &fingerprint, PngEffort::default(), Path::new("still.png"))
 }
 
 #[cfg(test)]
 mod tests {
-    use bansho::base::image::Image;
-
     use super::*;
 
     #[test]
@@ -271,9 +266,10 @@ mod tests {
         let assets: Arc<dyn Assets> = Arc::new(bansho::MemoryAssets::default());
         let scene = crate::document::check("scene", "bansho = 2\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
         let mut shot = Shot::open(scene.compiled, scene.plan);
-        let mut frame = bansho::draw(&mut shot, 0, &bansho::Unobserved).unwrap();
+        let mut frame = shot.draw(&STILL, &bansho::Unobserved).unwrap();
         assert!(encode_png(&frame).unwrap().starts_with(b"\x89PNG"));
-        frame.beauty = Image::filled(png::SIDE_LIMIT + 1, 1, [0.0; 4]);
+        let [width, height] = [png::SIDE_LIMIT + 1, 1];
+        frame.image = DisplayImage { width, height, pixels: DisplayPixels::Eight(vec![[0; 4]; width]), ..frame.image };
         assert!(matches!(encode_png(&frame), Err(MediaError::Size { .. })));
     }
 }

@@ -3,14 +3,14 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bansho_base::{
-    color::{AlphaConvention, View},
-    frame::{DisplayPixels, Frame},
+    color::AlphaConvention,
+    frame::{DisplayImage, DisplayPixels},
     host::observer::Observer,
     image::Rect,
 };
 use bansho_render::{
     CompiledScene, Plan, Shot,
-    display::{BitDepth, display},
+    display::{BitDepth, DisplayFrame, DisplayOptions},
 };
 use bansho_scene::picture::LARGEST_SIDE;
 
@@ -111,7 +111,13 @@ pub(crate) fn lit_region(
     (small.layers, small.aovs) = (false, false);
     // Half an 8-bit code of a single pixel, averaged over the pixels of a small one, in 16-bit codes.
     let min_alpha = if exact { 1 } else { (128.0 / (reduction * reduction)).max(1.0) as u16 };
-    let probe = LitRegionProbe { lit: Mutex::default(), view: plan.display, min_alpha };
+    let target = DisplayOptions {
+        view: plan.display,
+        depth: BitDepth::Sixteen,
+        alpha: AlphaConvention::Linear,
+        over_black: false,
+    };
+    let probe = LitRegionProbe { lit: Mutex::default(), target, min_alpha };
     draw_frames(&mut Shot::open(compiled.clone(), Arc::new(small)), numbers, &Snapshots::default(), &probe, observer)?;
     let lit = probe.lit.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok((!lit.is_empty()).then(|| Region::new(&lit, size)))
@@ -126,14 +132,20 @@ fn reduction_factor(size: [usize; 2]) -> f64 {
 /// Collects the lit region of all frames.
 struct LitRegionProbe {
     lit: Mutex<Rect>,
-    view: View,
+    target: DisplayOptions,
     /// Smallest alpha of a lit pixel, 16-bit code. Display pixels have alpha where they have light.
     min_alpha: u16,
 }
 
 impl FrameSink for LitRegionProbe {
-    fn finish(&self, _index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
-        let frame_bounds = bounds(frame, &self.view, self.min_alpha);
+    type Target = DisplayOptions;
+
+    fn target(&self) -> &DisplayOptions {
+        &self.target
+    }
+
+    fn finish(&self, _index: usize, frame: &mut DisplayFrame, _observer: &dyn Observer) -> Result<(), JobError> {
+        let frame_bounds = bounds(&frame.image, self.min_alpha);
         let mut lit = self.lit.lock().unwrap_or_else(PoisonError::into_inner);
         *lit = lit.union(&frame_bounds);
         Ok(())
@@ -144,14 +156,12 @@ impl FrameSink for LitRegionProbe {
     }
 }
 
-/// The smallest rectangle around all pixels of a frame whose alpha is at least `min_alpha`.
-fn bounds(frame: &Frame, view: &View, min_alpha: u16) -> Rect {
-    let (width, height) = (frame.beauty.width(), frame.beauty.height());
-    if frame.opaque {
-        return Rect::from_size(width, height);
-    }
-    let DisplayPixels::Sixteen(pixels) = display(frame, view, BitDepth::Sixteen, AlphaConvention::Linear).pixels else {
-        return Rect::default();
+/// The smallest rectangle around all pixels of a picture whose alpha is at least `min_alpha`, a code of 16 bits.
+fn bounds(picture: &DisplayImage, min_alpha: u16) -> Rect {
+    let width = picture.width;
+    let pixels = match &picture.pixels {
+        DisplayPixels::Sixteen(pixels) if !picture.opaque => pixels,
+        _ => return Rect::from_size(width, picture.height),
     };
     let mut lit = Rect::default();
     for (y, row) in pixels.chunks_exact(width.max(1)).enumerate() {
@@ -165,7 +175,8 @@ fn bounds(frame: &Frame, view: &View, min_alpha: u16) -> Rect {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::image::Image;
+    use bansho_base::{color::View, frame::Frame, image::Image};
+    use bansho_render::display::display;
 
     use super::*;
     use crate::job::testing;
@@ -175,7 +186,8 @@ mod tests {
         let mut frame = testing::blank(&testing::plan(), 0);
         frame.beauty = Image::filled(9, 7, [0.0; 4]);
         frame.content = Rect::from_size(9, 7);
-        let found = |frame: &Frame| bounds(frame, &View::DISPLAY, 1);
+        let found =
+            |frame: &Frame| bounds(&display(frame, &View::DISPLAY, BitDepth::Sixteen, AlphaConvention::Linear), 1);
         assert!(found(&frame).is_empty());
         frame.beauty.pixels_mut()[2 * 9 + 3] = [0.5, 0.1, 0.0, 0.0];
         frame.beauty.pixels_mut()[4 * 9 + 6] = [0.0, 0.0, 0.0, 0.3];

@@ -9,7 +9,7 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Light, SrgbLight},
 };
 use bansho_media::gltf::{self, AnimatedLight, LightKey};
-use bansho_render::{Plan, RenderError, Shot};
+use bansho_render::{Plan, RenderError, Shot, Target};
 use serde_json::{Value, json};
 
 use crate::job::pipeline::frame_source::FrameSource;
@@ -66,14 +66,10 @@ impl FrameSource for LightRecorder {
         self.shot.advance(number, observer)
     }
 
-    fn draw(&mut self, observer: &dyn Observer) -> Result<(), RenderError> {
-        self.shot.draw(observer)?;
+    fn draw<T: Target>(&mut self, target: &T, observer: &dyn Observer) -> Result<T::Frame, RenderError> {
+        let frame = self.shot.draw(target, observer)?;
         self.lights.push(flame_lights(&self.shot));
-        Ok(())
-    }
-
-    fn read(&mut self) -> Option<Frame> {
-        self.shot.read()
+        Ok(frame)
     }
 
     fn recycle(&mut self, recycled: Frame) {

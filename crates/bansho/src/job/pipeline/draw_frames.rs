@@ -1,10 +1,11 @@
 //! Draws the frames of a job one after the other. Whichever thread of the pool is free finishes them: encodes and writes them.
 
 use bansho_base::{
-    frame::Frame,
+    frame::{Frame, FrameHeader, PhenomenonMetadata},
     host::observer::{Observer, check},
 };
-use bansho_render::display::{DisplayFrame, DisplayOptions};
+use bansho_media::output::sink::FinishedPicture;
+use bansho_render::{Target, display::DisplayFrame};
 
 use super::{
     frame_source::FrameSource,
@@ -15,8 +16,19 @@ use crate::job::{checks::memory::max_frames_with_pixels, error::JobError, observ
 
 /// What drawn frames go to.
 pub(crate) trait FrameSink: Sync {
+    /// What frames are drawn as.
+    type Target: Target<Frame: DrawnFrame>;
+
+    /// What frames are drawn as.
+    fn target(&self) -> &Self::Target;
+
     /// Uses the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight).
-    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError>;
+    fn finish(
+        &self,
+        index: usize,
+        frame: &mut <Self::Target as Target>::Frame,
+        observer: &dyn Observer,
+    ) -> Result<(), JobError>;
 
     /// How many frames may be in flight at once.
     fn max_in_flight(&self) -> usize;
@@ -27,13 +39,88 @@ pub(crate) trait FrameSink: Sync {
     }
 }
 
-/// What frames go to of which only the display pixels are kept.
-pub(crate) trait DisplaySink: Sync {
-    /// Writes the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight).
-    fn write(&self, index: usize, frame: DisplayFrame, observer: &dyn Observer) -> Result<(), JobError>;
+/// A frame that was drawn, whatever its target.
+pub(crate) trait DrawnFrame: Send {
+    fn header(&self) -> &FrameHeader;
 
-    /// How many frames may be in flight at once.
-    fn max_in_flight(&self) -> usize;
+    fn header_mut(&mut self) -> &mut FrameHeader;
+
+    fn metadata(&self) -> &[PhenomenonMetadata];
+
+    /// Its pixels, for a file.
+    fn picture(&self) -> FinishedPicture<'_>;
+
+    /// Whether it consists of light.
+    fn keeps_light(&self) -> bool;
+
+    /// Bytes of the light that it was drawn from.
+    fn light_bytes(&self) -> usize;
+
+    /// That light, if the frame consists of it: the next frame is drawn into its memory.
+    fn into_light(self) -> Option<Frame>;
+}
+
+impl DrawnFrame for Frame {
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+
+    fn metadata(&self) -> &[PhenomenonMetadata] {
+        &self.metadata
+    }
+
+    fn picture(&self) -> FinishedPicture<'_> {
+        FinishedPicture::Linear(self)
+    }
+
+    fn keeps_light(&self) -> bool {
+        true
+    }
+
+    /// Color, alpha, depth and channels in single precision.
+    fn light_bytes(&self) -> usize {
+        let planes = 4 + usize::from(self.depth.is_some()) + self.channels.len();
+        self.beauty.width() * self.beauty.height() * size_of::<f32>() * planes
+    }
+
+    fn into_light(self) -> Option<Frame> {
+        Some(self)
+    }
+}
+
+impl DrawnFrame for DisplayFrame {
+    fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    fn header_mut(&mut self) -> &mut FrameHeader {
+        &mut self.header
+    }
+
+    fn metadata(&self) -> &[PhenomenonMetadata] {
+        &self.metadata
+    }
+
+    fn picture(&self) -> FinishedPicture<'_> {
+        FinishedPicture::Display(&self.image, &self.header.fingerprint)
+    }
+
+    fn keeps_light(&self) -> bool {
+        false
+    }
+
+    /// Color and alpha in single precision.
+    fn light_bytes(&self) -> usize {
+        self.image.width * self.image.height * 4 * size_of::<f32>()
+    }
+
+    fn into_light(self) -> Option<Frame> {
+        None
+    }
 }
 
 /// Bytes of frames that may be in flight at once, unless two frames alone are larger.
@@ -45,28 +132,28 @@ const MAX_BYTES_IN_FLIGHT: usize = 1 << 30;
 ///
 /// # Errors
 /// The first failure of a frame, or the observer canceled the job. Finished frames are kept.
-pub(crate) fn draw_frames(
-    shot: &mut dyn FrameSource,
+pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
+    shot: &mut S,
     numbers: &[i64],
     snapshots: &Snapshots,
-    sink: &dyn FrameSink,
+    sink: &K,
     observer: &dyn JobObserver,
 ) -> Result<(), JobError> {
     let in_flight = InFlightFrames::default();
     let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
-    let (mut last, mut max_with_pixels) = (None, usize::MAX);
+    let (mut last, mut max_with_light) = (None, usize::MAX);
     let drawn = rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
-            in_flight.wait_for_pixels(max_with_pixels);
+            in_flight.wait_for_light(max_with_light);
             if let Some(recycled) = in_flight.take_recycled() {
                 shot.recycle(recycled);
             }
             advance(shot, last, number, snapshots, &stop_on_failure, observer)?;
             last = Some(number);
-            shot.draw(&stop_on_failure)?;
-            let frame = shot.read().ok_or(JobError::Cancelled)?;
-            max_with_pixels = max_frames_with_pixels(bytes_of(&frame), sink.writes_pixels());
-            in_flight.submit(index, in_flight_limit(bytes_of(&frame), sink.max_in_flight()));
+            let frame = shot.draw(sink.target(), &stop_on_failure)?;
+            let light_bytes = frame.light_bytes();
+            max_with_light = max_frames_with_pixels(light_bytes, sink.writes_pixels());
+            in_flight.submit(index, in_flight_limit(light_bytes, sink.max_in_flight()), frame.keeps_light());
             spawn_finish(scope, sink, &stop_on_failure, index, frame);
         }
         Ok(())
@@ -76,64 +163,16 @@ pub(crate) fn draw_frames(
     check(observer).map_err(|_| JobError::Cancelled)
 }
 
-/// Draws the frames `numbers` in order as display pixels, strip by strip: the light of a whole frame is in memory only where it is refracted. A frame is
-/// drawn while earlier ones are still being compressed and written.
-///
-/// Runs in the caller's rayon pool, and uses no other thread.
-///
-/// # Errors
-/// The first failure of a frame, or the observer canceled the job. Finished frames are kept.
-pub(crate) fn draw_display_frames(
-    shot: &mut dyn FrameSource,
-    numbers: &[i64],
-    snapshots: &Snapshots,
-    options: &DisplayOptions,
-    sink: &dyn DisplaySink,
-    observer: &dyn JobObserver,
-) -> Result<(), JobError> {
-    let in_flight = InFlightFrames::default();
-    let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
-    let mut last = None;
-    let drawn = rayon::in_place_scope_fifo(|scope| {
-        for (index, &number) in numbers.iter().enumerate() {
-            advance(shot, last, number, snapshots, &stop_on_failure, observer)?;
-            last = Some(number);
-            let frame = shot.draw_display(options, &stop_on_failure)?;
-            let pixels = frame.image.width * frame.image.height;
-            in_flight.submit(index, in_flight_limit(pixels * LIGHT_BYTES, sink.max_in_flight()));
-            spawn_write(scope, sink, &stop_on_failure, index, frame);
-        }
-        Ok(())
-    });
-    in_flight.take_error().map_or(drawn, Err)?;
-    check(observer).map_err(|_| JobError::Cancelled)
-}
-
-/// Writes a drawn frame.
-fn spawn_write<'scope>(
-    scope: &rayon::ScopeFifo<'scope>,
-    sink: &'scope dyn DisplaySink,
-    stop_on_failure: &'scope StopOnFailure,
-    index: usize,
-    frame: DisplayFrame,
-) {
-    let in_flight = stop_on_failure.in_flight;
-    scope.spawn_fifo(move |_| {
-        let _completion = CompletionGuard { in_flight, index };
-        if !stop_on_failure.cancelled() {
-            sink.write(index, frame, stop_on_failure).unwrap_or_else(|error| in_flight.fail(error));
-        }
-    });
-}
-
 /// Finishes a drawn frame.
-fn spawn_finish<'scope>(
+fn spawn_finish<'scope, K: FrameSink>(
     scope: &rayon::ScopeFifo<'scope>,
-    sink: &'scope dyn FrameSink,
+    sink: &'scope K,
     stop_on_failure: &'scope StopOnFailure,
     index: usize,
-    mut frame: Frame,
-) {
+    mut frame: <K::Target as Target>::Frame,
+) where
+    <K::Target as Target>::Frame: 'scope,
+{
     let in_flight = stop_on_failure.in_flight;
     scope.spawn_fifo(move |_| {
         let _completion = CompletionGuard { in_flight, index };
@@ -141,7 +180,9 @@ fn spawn_finish<'scope>(
             return;
         }
         sink.finish(index, &mut frame, stop_on_failure).unwrap_or_else(|error| in_flight.fail(error));
-        in_flight.recycle(index, frame);
+        if let Some(light) = frame.into_light() {
+            in_flight.recycle(index, light);
+        }
     });
 }
 
@@ -168,15 +209,6 @@ fn in_flight_limit(bytes: usize, max: usize) -> usize {
     (MAX_BYTES_IN_FLIGHT / bytes.max(1)).clamp(2, max)
 }
 
-/// Bytes of the pixels of a frame: color, alpha, depth and channels in single precision.
-fn bytes_of(frame: &Frame) -> usize {
-    let planes = 4 + usize::from(frame.depth.is_some()) + frame.channels.len();
-    frame.beauty.width() * frame.beauty.height() * size_of::<f32>() * planes
-}
-
-/// Bytes of the color and the alpha of a pixel in single precision.
-const LIGHT_BYTES: usize = 4 * size_of::<f32>();
-
 #[cfg(test)]
 mod tests {
     use std::{
@@ -198,7 +230,7 @@ mod tests {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
     }
 
-    fn run(numbers: &[i64], sink: &dyn FrameSink, observer: &RecordingObserver) -> Result<(), JobError> {
+    fn run(numbers: &[i64], sink: &impl FrameSink, observer: &RecordingObserver) -> Result<(), JobError> {
         draw_frames(&mut CountingSource::new(), numbers, &Snapshots::default(), sink, observer)
     }
 

@@ -28,8 +28,8 @@ pub(crate) struct InFlightFrames {
 #[derive(Default)]
 struct State {
     unfinished: BTreeSet<usize>,
-    /// Those of them whose pixels are in memory.
-    with_pixels: BTreeSet<usize>,
+    /// Those of them whose light is in memory.
+    with_light: BTreeSet<usize>,
     error: Option<JobError>,
     recycled: Option<Frame>,
 }
@@ -45,16 +45,19 @@ impl InFlightFrames {
 
     /// Waits until frame `index` is less than `limit` ahead of the oldest unfinished one, and executes tasks of the pool in the meantime:
     /// in a pool of one thread no other thread does. The distance is counted in indices, so that the window of a video never overflows.
-    pub(crate) fn submit(&self, index: usize, limit: usize) {
+    /// `keeps_light` says whether the light of this frame is in memory.
+    pub(crate) fn submit(&self, index: usize, limit: usize, keeps_light: bool) {
         let mut state = self.wait_until(|state| index < state.unfinished.first().copied().unwrap_or(index) + limit);
         state.unfinished.insert(index);
-        state.with_pixels.insert(index);
+        if keeps_light {
+            state.with_light.insert(index);
+        }
     }
 
-    /// Waits until the pixels of fewer than `max` frames are in memory, so that another one can be drawn, and executes tasks of the pool in the
+    /// Waits until the light of fewer than `max` frames is in memory, so that another one can be drawn, and executes tasks of the pool in the
     /// meantime.
-    pub(crate) fn wait_for_pixels(&self, max: usize) {
-        drop(self.wait_until(|state| state.with_pixels.len() < max));
+    pub(crate) fn wait_for_light(&self, max: usize) {
+        drop(self.wait_until(|state| state.with_light.len() < max));
     }
 
     fn wait_until(&self, is_reached: impl Fn(&State) -> bool) -> MutexGuard<'_, State> {
@@ -71,10 +74,10 @@ impl InFlightFrames {
         }
     }
 
-    /// Keeps frame `index`, whose pixels are no longer needed: the next one reuses their memory.
+    /// Keeps frame `index`, whose light is no longer needed: the next one reuses their memory.
     pub(crate) fn recycle(&self, index: usize, frame: Frame) {
         let mut state = self.lock();
-        state.with_pixels.remove(&index);
+        state.with_light.remove(&index);
         state.recycled = Some(frame);
         drop(state);
         self.completed.notify_all();
@@ -122,7 +125,7 @@ impl Drop for CompletionGuard<'_> {
     fn drop(&mut self) {
         let mut state = self.in_flight.lock();
         state.unfinished.remove(&self.index);
-        state.with_pixels.remove(&self.index);
+        state.with_light.remove(&self.index);
         drop(state);
         self.in_flight.completed.notify_all();
     }
@@ -178,17 +181,17 @@ mod tests {
     }
 
     #[test]
-    fn the_pixels_of_a_frame_are_free_before_it_is_finished() {
+    fn the_light_of_a_frame_is_free_before_it_is_finished() {
         let in_flight = InFlightFrames::default();
-        in_flight.submit(0, 2);
+        in_flight.submit(0, 2, true);
         in_flight.recycle(0, blank(&plan(), 0));
-        // Would wait forever for pixels that are in use.
-        in_flight.wait_for_pixels(1);
+        // Would wait forever for light that is in use.
+        in_flight.wait_for_light(1);
         assert!(in_flight.take_recycled().is_some());
         assert_eq!(in_flight.lock().unfinished, BTreeSet::from([0]));
-        in_flight.submit(1, 2);
+        in_flight.submit(1, 2, true);
         // Also those of a frame that failed before it was recycled.
         drop(CompletionGuard { in_flight: &in_flight, index: 1 });
-        in_flight.wait_for_pixels(1);
+        in_flight.wait_for_light(1);
     }
 }

@@ -16,13 +16,13 @@ use bansho_media::{
     imageops::sprite_sheet::SheetLayout,
     output::sink::{FinishedPicture, FrameSlot},
 };
-use bansho_render::Shot;
+use bansho_render::{SceneLinear, Shot};
 
 use super::{
     checks::{finished_files::FinishedFiles, plates},
     error::JobError,
     observer::{JobObserver, JobStarted},
-    pipeline::draw_frames::{draw_display_frames, draw_frames},
+    pipeline::draw_frames::draw_frames,
     sheet::TileCollector,
 };
 use output::FileWriter;
@@ -89,16 +89,20 @@ impl PreparedJob {
         let max_in_flight = rayon::current_num_threads() + 1;
         let sink =
             self.format.open(&self.plan, self.compiled.has_opaque_plate(), numbers.len(), size, max_in_flight)?;
-        let drawn = AtomicUsize::new(0);
-        let files = FileWriter { format: &self.format, sink, max_in_flight, observer, drawn, finished };
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
-        match self.format.display_options(&files.sink) {
-            Some(options) => {
-                draw_display_frames(&mut shot, numbers, &self.snapshots, &options, &files, observer)?;
+        let (format, drawn) = (&self.format, AtomicUsize::new(0));
+        match format.display_options(&sink) {
+            Some(target) => {
+                let files = FileWriter { format, target, sink: &sink, max_in_flight, observer, drawn, finished };
+                draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?;
             }
-            None => draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?,
+            None => {
+                let target = SceneLinear;
+                let files = FileWriter { format, target, sink: &sink, max_in_flight, observer, drawn, finished };
+                draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?;
+            }
         }
-        Ok(files.sink.finish()?)
+        Ok(sink.finish()?)
     }
 
     /// Draws all frames into one picture and writes it.

@@ -7,17 +7,17 @@ use std::{
 
 use bansho_base::{
     color::{AlphaConvention, View},
-    frame::{DisplayImage, Frame, FrameHeader, PhenomenonMetadata},
+    frame::{DisplayImage, Frame},
     host::observer::{Observer, Stage, StageGuard},
 };
 use bansho_media::{
     files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
     format::{OutputKind, PictureFormat},
-    output::sink::{FinishedPicture, FrameSlot, Sink, SinkOptions},
+    output::sink::{FrameSlot, Sink, SinkOptions},
 };
 use bansho_render::{
-    Plan,
-    display::{BitDepth, DisplayFrame, DisplayOptions, display},
+    Plan, Target,
+    display::{BitDepth, DisplayOptions, display},
     fingerprint,
 };
 
@@ -26,7 +26,7 @@ use crate::job::{
     checks::finished_files::FinishedFiles,
     error::JobError,
     observer::{FrameDone, JobObserver},
-    pipeline::draw_frames::{DisplaySink, FrameSink},
+    pipeline::draw_frames::{DrawnFrame, FrameSink},
 };
 
 /// How the pictures of a job are written.
@@ -84,45 +84,27 @@ impl Format {
         Ok(Sink::open(self.pattern.clone(), options)?)
     }
 
-    /// Writes the scene-linear light of a frame.
-    fn write_light(
+    /// Writes a frame, and returns its number.
+    fn write(
         &self,
         sink: &Sink,
         index: usize,
-        frame: &mut Frame,
+        frame: &mut impl DrawnFrame,
         observer: &dyn Observer,
-    ) -> Result<(), JobError> {
-        frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
-        self.write_metadata(sink, &frame.header, &frame.metadata)?;
-        let slot = FrameSlot { index, number: frame.header.number };
+    ) -> Result<i64, JobError> {
+        let header = frame.header_mut();
+        header.fingerprint = self.fingerprint(header.fingerprint);
+        let number = header.number;
+        self.write_metadata(sink, number, frame)?;
         let _stage = StageGuard::begin(observer, Stage::Write);
-        Ok(sink.write(slot, FinishedPicture::Linear(frame))?)
-    }
-
-    /// Writes the display pixels of a frame.
-    fn write_display(
-        &self,
-        sink: &Sink,
-        index: usize,
-        mut frame: DisplayFrame,
-        observer: &dyn Observer,
-    ) -> Result<(), JobError> {
-        frame.header.fingerprint = self.fingerprint(frame.header.fingerprint);
-        self.write_metadata(sink, &frame.header, &frame.metadata)?;
-        let slot = FrameSlot { index, number: frame.header.number };
-        let _stage = StageGuard::begin(observer, Stage::Write);
-        Ok(sink.write(slot, FinishedPicture::Display(&frame.image, &frame.header.fingerprint))?)
+        sink.write(FrameSlot { index, number }, frame.picture())?;
+        Ok(number)
     }
 
     /// Writes the metadata of a frame if requested: before the picture, so that every existing picture has its metadata.
-    fn write_metadata(
-        &self,
-        sink: &Sink,
-        header: &FrameHeader,
-        phenomena: &[PhenomenonMetadata],
-    ) -> Result<(), JobError> {
+    fn write_metadata(&self, sink: &Sink, number: i64, frame: &impl DrawnFrame) -> Result<(), JobError> {
         if self.metadata {
-            metadata::write(header, phenomena, &sink.path(header.number), &self.overwrite)?;
+            metadata::write(frame.header(), frame.metadata(), &sink.path(number), &self.overwrite)?;
         }
         Ok(())
     }
@@ -145,29 +127,30 @@ impl Format {
 }
 
 /// Writes every frame to the sink.
-pub(crate) struct FileWriter<'a> {
+pub(crate) struct FileWriter<'a, T> {
     pub(crate) format: &'a Format,
-    pub(crate) sink: Sink,
+    /// What frames are drawn as: what the sink takes.
+    pub(crate) target: T,
+    pub(crate) sink: &'a Sink,
     pub(crate) max_in_flight: usize,
     pub(crate) observer: &'a dyn JobObserver,
     pub(crate) drawn: AtomicUsize,
     pub(crate) finished: &'a FinishedFiles,
 }
 
-impl FileWriter<'_> {
-    /// Frame `number` is written.
-    fn written(&self, number: i64) {
+impl<T: Target<Frame: DrawnFrame>> FrameSink for FileWriter<'_, T> {
+    type Target = T;
+
+    fn target(&self) -> &T {
+        &self.target
+    }
+
+    fn finish(&self, index: usize, frame: &mut T::Frame, observer: &dyn Observer) -> Result<(), JobError> {
+        let number = self.format.write(self.sink, index, frame, observer)?;
         let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
         let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
         path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.record(file));
         self.observer.frame_done(&FrameDone { number, path, drawn });
-    }
-}
-
-impl FrameSink for FileWriter<'_> {
-    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
-        self.format.write_light(&self.sink, index, frame, observer)?;
-        self.written(frame.header.number);
         Ok(())
     }
 
@@ -177,18 +160,5 @@ impl FrameSink for FileWriter<'_> {
 
     fn writes_pixels(&self) -> bool {
         true
-    }
-}
-
-impl DisplaySink for FileWriter<'_> {
-    fn write(&self, index: usize, frame: DisplayFrame, observer: &dyn Observer) -> Result<(), JobError> {
-        let number = frame.header.number;
-        self.format.write_display(&self.sink, index, frame, observer)?;
-        self.written(number);
-        Ok(())
-    }
-
-    fn max_in_flight(&self) -> usize {
-        self.max_in_flight
     }
 }

@@ -326,11 +326,8 @@ pub(crate) fn alpha_convention(
     view: View,
     default: AlphaConvention,
 ) -> Result<AlphaConvention, OptionError> {
-    match option {
-        Some(AlphaConvention::Encoded) if view == View::RAW => Err(OptionError::RawAlpha),
-        None if view == View::RAW => Ok(AlphaConvention::Linear),
-        option => Ok(option.unwrap_or(default)),
-    }
+    let alpha = view.alpha_convention(option.unwrap_or(default));
+    if option.is_some_and(|option| option != alpha) { Err(OptionError::RawAlpha) } else { Ok(alpha) }
 }
 
 /// The frames of a job, ascending: `option`, or all frames of the plan if it is `None`.

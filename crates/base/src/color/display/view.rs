@@ -79,6 +79,12 @@ impl View {
         self
     }
 
+    /// The convention of alpha in this view where `requested` is asked for: `raw` encodes nothing, so its alpha is always linear.
+    #[must_use]
+    pub fn alpha_convention(&self, requested: AlphaConvention) -> AlphaConvention {
+        if self.tone.is_none() { AlphaConvention::Linear } else { requested }
+    }
+
     /// The view's name.
     #[must_use]
     pub const fn name(&self) -> &'static str {

@@ -1,25 +1,50 @@
-//! The memory of a frame, which is reused from frame to frame and drawn strip by strip.
+//! Frames of scene-linear light, which are drawn strip by strip into memory that is reused from frame to frame.
 
 use bansho_base::{
-    frame::Frame,
+    frame::{Frame, FrameHeader},
+    host::observer::Cancelled,
     image::{Image, Rect},
 };
 
+use super::{
+    composition::{Composition, STRIP_ROWS},
+    strips::{StripLight, StripPixels, draw_strips},
+};
+
+/// Draws and composites the whole window as scene-linear light, in the memory of an earlier frame.
+pub(crate) fn draw_frame(
+    composition: &Composition,
+    header: FrameHeader,
+    recycled: Option<Frame>,
+) -> Result<Frame, Cancelled> {
+    let mut memory = FrameMemory::new(composition.view.window, composition.outputs.depth, recycled);
+    let channels = draw_strips(composition, memory.strips(STRIP_ROWS))?;
+    Ok(Frame {
+        header,
+        beauty: memory.beauty,
+        depth: memory.depth,
+        channels,
+        opaque: composition.is_opaque(),
+        content: composition.content(),
+        metadata: Vec::new(),
+    })
+}
+
 /// The memory of a frame.
-pub(super) struct FrameMemory {
+struct FrameMemory {
     /// Color and alpha.
-    pub(super) beauty: Image<4>,
+    beauty: Image<4>,
     /// Depth, m; `None` where nothing reads it.
-    pub(super) depth: Option<Vec<f32>>,
+    depth: Option<Vec<f32>>,
     /// Pixels that still contain an earlier frame; all others are empty.
     stale: Rect,
 }
 
-/// The pixels of a strip in a frame, row by row.
-pub(super) struct StripPixels<'a> {
-    pub(super) beauty: &'a mut [[f32; 4]],
+/// The light of a strip in a frame, row by row.
+struct FrameStrip<'a> {
+    beauty: &'a mut [[f32; 4]],
     /// Empty where the frame has no depth.
-    pub(super) depth: &'a mut [f32],
+    depth: &'a mut [f32],
     /// Pixels of the strip that still contain an earlier frame.
     stale: Rect,
     width: usize,
@@ -27,7 +52,7 @@ pub(super) struct StripPixels<'a> {
 
 impl FrameMemory {
     /// Takes the memory of a recycled frame of the same size: page faults of new memory cost more than drawing a sparse frame.
-    pub(super) fn new(window: Rect, has_depth: bool, recycled: Option<Frame>) -> Self {
+    fn new(window: Rect, has_depth: bool, recycled: Option<Frame>) -> Self {
         let (width, height) = (window.width, window.height);
         let fits = |frame: &Frame| {
             frame.beauty.width() == width && frame.beauty.height() == height && frame.depth.is_some() == has_depth
@@ -40,7 +65,7 @@ impl FrameMemory {
     }
 
     /// Its strips of `strip_rows` rows from the top; the last one may have fewer.
-    pub(super) fn strips(&mut self, strip_rows: usize) -> Vec<StripPixels<'_>> {
+    fn strips(&mut self, strip_rows: usize) -> Vec<FrameStrip<'_>> {
         let (width, stale) = (self.beauty.width(), self.stale);
         let pixels = strip_rows * width;
         let mut depth = self.depth.iter_mut().flat_map(|depth| depth.chunks_mut(pixels));
@@ -48,15 +73,24 @@ impl FrameMemory {
             let rows = Rect { x: 0, y: index * strip_rows, width, height: strip_rows };
             let stale = stale.intersection(&rows);
             let stale = Rect { y: stale.y.saturating_sub(rows.y), ..stale };
-            StripPixels { beauty, depth: depth.next().unwrap_or_default(), stale, width }
+            FrameStrip { beauty, depth: depth.next().unwrap_or_default(), stale, width }
         };
         self.beauty.pixels_mut().chunks_mut(pixels).enumerate().map(strip).collect()
     }
 }
 
-impl StripPixels<'_> {
+impl StripPixels for FrameStrip<'_> {
+    fn light<'a>(&'a mut self, strip: Rect, _drawn: Rect, _buffer: &'a mut Vec<[f32; 4]>) -> StripLight<'a> {
+        self.clear();
+        StripLight { rect: strip, beauty: self.beauty, depth: self.depth }
+    }
+
+    fn convert(&mut self, _strip: Rect, _drawn: Rect, _buffer: &[[f32; 4]]) {}
+}
+
+impl FrameStrip<'_> {
     /// Clears what an earlier frame has left.
-    pub(super) fn clear(&mut self) {
+    fn clear(&mut self) {
         for y in self.stale.y..self.stale.bottom() {
             let pixels = y * self.width + self.stale.x..y * self.width + self.stale.right();
             self.beauty[pixels.clone()].fill([0.0; 4]);

@@ -1,0 +1,152 @@
+//! Drawing the frame that a shot was advanced to.
+
+use std::sync::Arc;
+
+use bansho_base::{
+    frame::{Channel, Frame, PhenomenonMetadata},
+    host::observer::{self, Cancelled, Observer, Stage, StageGuard},
+    image::Rect,
+    phenomenon::{Prepared, strip::View, surroundings::Publication},
+};
+
+use super::{PreparationInputs, PreparedSlices, RenderError, Shot, reflection::SceneMirror};
+use crate::{
+    compiled::ActiveRun,
+    composite::{
+        background::Background,
+        composition::{Composition, Outputs},
+        hiding::HidingDepth,
+        plate::PlateFrame,
+    },
+    context::ShotContext,
+    target::{Drawing, SceneLinear, Target},
+};
+
+impl Shot {
+    /// Draws the frame that the shot was advanced to, as `target` says: as scene-linear light ([`SceneLinear`]), or as display codes
+    /// ([`DisplayOptions`](crate::display::DisplayOptions)).
+    ///
+    /// # Errors
+    /// The observer asked to stop, or the plate cannot be read.
+    pub fn draw<T: Target>(&mut self, target: &T, observer: &dyn Observer) -> Result<T::Frame, RenderError> {
+        let plate = {
+            let _stage = StageGuard::begin(observer, Stage::Load);
+            let ShotContext { compiled, plan, .. } = &self.context;
+            let plate = self.plates.frame(compiled, plan, self.number);
+            plate.map_err(|error| RenderError::Plate(Box::new(error)))?
+        };
+        let view = self.context.plan.view_at(self.time);
+        let preparing = StageGuard::begin(observer, Stage::Prepare);
+        let publications = self.publications(view.shutter, observer);
+        let mirrored = match self.mirror(&view, &publications) {
+            Some(SceneMirror { mirror, pixel_size, .. }) => {
+                self.plates.mirrored(&self.context.plan, mirror, pixel_size, observer)?
+            }
+            None => Arc::default(),
+        };
+        drop(preparing);
+        let pictures = FramePictures { plate: &plate, mirrored: &mirrored, publications: &publications };
+        let mut recycled = self.recycled.take();
+        let drawn = self.draw_view(&view, pictures, target, &mut recycled, observer);
+        self.recycled = recycled;
+        if let Some(frame) = drawn? {
+            return Ok(frame);
+        }
+        let [width, height] = view.size;
+        let whole = view.with_window(Rect::from_size(width, height));
+        let whole = self.draw_view(&whole, pictures, &SceneLinear, &mut None, observer)?.ok_or(Cancelled)?;
+        let window = crop(whole, self.context.plan.window).ok_or(Cancelled)?;
+        Ok(target.of_light(window, &mut None))
+    }
+
+    /// Draws the view. `None` if its window is not the whole picture and light is refracted: it may come from outside the window, so the whole
+    /// picture must be drawn and cropped.
+    fn draw_view<T: Target>(
+        &self,
+        view: &View,
+        FramePictures { plate, mirrored, publications }: FramePictures,
+        target: &T,
+        recycled: &mut Option<Frame>,
+        observer: &dyn Observer,
+    ) -> Result<Option<T::Frame>, RenderError> {
+        let preparing = StageGuard::begin(observer, Stage::Prepare);
+        let reflection = self.reflection(view, mirrored, publications, observer)?;
+        let surroundings = self.surroundings(view, publications, reflection.as_ref());
+        let all: Vec<usize> = (0..self.runs.len()).collect();
+        let runs: Vec<&ActiveRun> = self.runs.iter().collect();
+        let parts = self.exposure_parts(&all, view, &surroundings, publications);
+        let inputs = PreparationInputs { view, surroundings: &surroundings, parts: &parts, is_mirrored: false };
+        let PreparedSlices { slices, prepared } = self.prepare(&all, inputs, observer)?;
+        drop(preparing);
+        let _stage = StageGuard::begin(observer, Stage::Draw);
+        observer::check(observer)?;
+        // Only what is behind refracting air is refracted.
+        let has_background = plate.color.is_some() || self.runs.len() > 1;
+        let is_whole = view.window == Rect::from_size(view.size[0], view.size[1]);
+        // Also if nothing in the window is refracted: compositing in groups of slices rounds all pixels differently.
+        if !is_whole && has_background && prepared.iter().any(|prepared| prepared.may_refract()) {
+            // It has the size of the window, and would only take memory while the whole picture is drawn.
+            *recycled = None;
+            return Ok(None);
+        }
+        let is_refracted = has_background && prepared.iter().any(|prepared| prepared.deflection().is_some());
+        let outputs = Outputs::of_plan(&self.context.plan);
+        let through = HidingDepth::through(&prepared, plate);
+        let composition = Composition {
+            // What is nearer than refracting air is not refracted.
+            outputs: Outputs { depth: outputs.depth || is_refracted, ..outputs },
+            is_mirrored: false,
+            observer,
+            view,
+            runs: &runs,
+            prepared: &prepared,
+            slices: &slices,
+            plate,
+            hiding: &HidingDepth::new(&prepared, plate),
+            through: through.as_ref(),
+            background: Background::plate(plate),
+            scratches: &self.scratches,
+        };
+        let header = self.context.header(self.number, self.time);
+        let metadata = if self.context.plan.metadata { self.metadata(&prepared) } else { Vec::new() };
+        let drawing = Drawing { composition: &composition, is_refracted, header, metadata };
+        Ok(Some(target.draw(drawing, recycled)?))
+    }
+
+    /// The metadata of every phenomenon that has any.
+    fn metadata(&self, prepared: &[Box<dyn Prepared + '_>]) -> Vec<PhenomenonMetadata> {
+        let names = self.runs.iter().map(|run| run.info().name.to_owned());
+        let each = names.zip(prepared.iter().map(|prepared| prepared.metadata()));
+        each.filter(|(_, entries)| !entries.is_empty())
+            .map(|(phenomenon, entries)| PhenomenonMetadata { phenomenon, entries })
+            .collect()
+    }
+}
+
+/// What a frame is drawn from, besides the state of the simulations.
+#[derive(Clone, Copy)]
+struct FramePictures<'a> {
+    plate: &'a PlateFrame,
+    /// The plate as seen in the mirror.
+    mirrored: &'a PlateFrame,
+    publications: &'a [Publication],
+}
+
+/// The region `window` of a whole frame.
+fn crop(whole: Frame, window: Rect) -> Option<Frame> {
+    let width = whole.beauty.width();
+    let plane = |values: &[f32]| -> Vec<f32> {
+        let row = |y| values[y * width + window.x..][..window.width].iter().copied();
+        (window.y..window.bottom()).flat_map(row).collect()
+    };
+    let channels = whole.channels.iter().map(|channel| Channel { values: plane(&channel.values), ..channel.clone() });
+    Some(Frame {
+        beauty: whole.beauty.crop(window)?,
+        depth: whole.depth.as_deref().map(plane),
+        channels: channels.collect(),
+        header: whole.header,
+        opaque: whole.opaque,
+        metadata: whole.metadata,
+        content: Rect::from_size(window.width, window.height),
+    })
+}
