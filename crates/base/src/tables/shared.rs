@@ -78,9 +78,9 @@ pub trait SharedTable: TableParameters + CloneSharedTable {
         false
     }
 
-    /// Whether it is drawn.
+    /// Whether it is drawn, if its [`SharedRole`] says how.
     fn is_visible(&self) -> bool {
-        false
+        true
     }
 
     /// Whether it is seen where nothing else is.
@@ -152,6 +152,12 @@ impl BuiltTable {
     #[must_use]
     pub fn parameters<P: 'static>(&self) -> Option<&P> {
         self.parameters.as_any().downcast_ref()
+    }
+
+    /// The parameters of the first of `tables`, for phenomena that draw one table; the defaults if there is none of type `P`.
+    #[must_use]
+    pub fn first_or_default<P: Clone + Default + 'static>(tables: &[Self]) -> P {
+        tables.first().and_then(Self::parameters::<P>).cloned().unwrap_or_default()
     }
 
     /// What was built, if it is of type `O`.

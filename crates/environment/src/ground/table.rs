@@ -32,10 +32,6 @@ impl SharedTable for GroundParameters {
         Self::KIND
     }
 
-    fn is_visible(&self) -> bool {
-        true
-    }
-
     fn fills_background(&self) -> bool {
         true
     }
@@ -46,6 +42,5 @@ impl SharedTable for GroundParameters {
 }
 
 fn draw(tables: &[BuiltTable], context: &BuildContext) -> Arc<dyn Phenomenon> {
-    let parameters = tables.first().and_then(BuiltTable::parameters::<GroundParameters>).cloned();
-    Arc::new(Ground::new(parameters.unwrap_or_default(), context.seed, context.loop_s))
+    Arc::new(Ground::new(BuiltTable::first_or_default(tables), context.seed, context.loop_s))
 }

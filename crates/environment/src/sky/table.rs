@@ -60,6 +60,5 @@ impl SharedTable for SkyParameters {
 }
 
 fn draw(tables: &[BuiltTable], context: &BuildContext) -> Arc<dyn Phenomenon> {
-    let parameters = tables.first().and_then(BuiltTable::parameters::<SkyParameters>).cloned();
-    Arc::new(SkyBackdrop::new(parameters.unwrap_or_default(), context.seed))
+    Arc::new(SkyBackdrop::new(BuiltTable::first_or_default(tables), context.seed))
 }

@@ -388,27 +388,40 @@ impl BlockCoder<'_> {
     /// A block of a sequential file (T.81, F.2.2).
     fn sequential(&self, bits: &mut Bits, prediction: &mut i64) -> Result<(), BlockFault> {
         self.dc(bits, prediction, 0)?;
+        self.ac(bits, 0, [1, 63], &mut 0).map(|_| ())
+    }
+
+    /// New AC coefficients of the band from `first` to `last`, whose lowest bit is at `low`, in sequential files (T.81, F.2.2.2) as in progressive ones. They are
+    /// marked in `nonzero`. Returns the number of zeros in the code that ends the band early; `None` if its last coefficient is coded.
+    fn ac(
+        &self,
+        bits: &mut Bits,
+        low: u32,
+        [first, last]: [usize; 2],
+        nonzero: &mut u64,
+    ) -> Result<Option<usize>, BlockFault> {
         let table = self.ac.ok_or(BlockFault::Unknown)?;
-        let mut index = 1;
-        while index < 64 {
+        let mut index = first;
+        while index <= last {
             let code = bits.code(table)?;
             let (zeros, category) = (usize::from(code >> 4), code & 15);
             if category == 0 {
-                // Zero and no zeros, the end of the block; with 15 zeros it is one of 16.
+                // A zero after fewer than 15 ends the band; with 15 it is one of 16.
                 if zeros < 15 {
-                    return Ok(());
+                    return Ok(Some(zeros));
                 }
                 index += 16;
                 continue;
             }
             index += zeros;
-            if index > 63 {
+            if index > last {
                 return Err(BlockFault::Coefficients);
             }
-            self.check(bits.number(category)?.into(), index)?;
+            self.check(i64::from(bits.number(category)?) << low, index)?;
+            *nonzero |= 1 << index;
             index += 1;
         }
-        if index > 64 { Err(BlockFault::Coefficients) } else { Ok(()) }
+        if index > last + 1 { Err(BlockFault::Coefficients) } else { Ok(None) }
     }
 
     /// The DC coefficient of a block in a progressive file (T.81, G.1.2.1).
@@ -427,28 +440,11 @@ impl BlockCoder<'_> {
 
     /// The first bits of a band of coefficients (T.81, G.1.2.2).
     fn first_ac(&self, bits: &mut Bits, nonzero: &mut u64, end_of_band: &mut usize) -> Result<(), BlockFault> {
-        let table = self.ac.ok_or(BlockFault::Unknown)?;
-        let mut index = self.scan.first;
-        while index <= self.scan.last {
-            let code = bits.code(table)?;
-            let (zeros, category) = (usize::from(code >> 4), code & 15);
-            if category == 0 {
-                if zeros < 15 {
-                    *end_of_band = Self::end_of_band(bits, zeros)? - 1;
-                    return Ok(());
-                }
-                index += 16;
-                continue;
-            }
-            index += zeros;
-            if index > self.scan.last {
-                return Err(BlockFault::Coefficients);
-            }
-            self.check(i64::from(bits.number(category)?) << self.scan.low, index)?;
-            *nonzero |= 1 << index;
-            index += 1;
+        let Scan { first, last, low, .. } = *self.scan;
+        if let Some(category) = self.ac(bits, low, [first, last], nonzero)? {
+            *end_of_band = Self::end_of_band(bits, category)? - 1;
         }
-        if index > self.scan.last + 1 { Err(BlockFault::Coefficients) } else { Ok(()) }
+        Ok(())
     }
 
     /// Further bits of a band of coefficients (T.81, G.1.2.3).

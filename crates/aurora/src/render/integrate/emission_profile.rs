@@ -115,36 +115,40 @@ fn table_index(node: f32) -> usize {
 /// Emission above and below an observer within the light, each without the other. A line of sight nearly along the field looks through only one of
 /// them, while a table of the whole profile, filtered over many kilometers, mixes both.
 pub(super) struct ProfilesAroundObserver<'a> {
-    profiles: &'a EmissionProfiles,
-    altitude_km: f64,
-    tables: Vec<OnceLock<[Vec<PerEmitter<f32>>; 2]>>,
+    /// The profiles of which both are parts.
+    whole_profiles: &'a EmissionProfiles,
+    observer_altitude_km: f64,
+    /// For each table of `whole_profiles`, the mip levels of its parts above and below the observer; computed on first use.
+    parts_above_and_below: Vec<OnceLock<[Vec<PerEmitter<f32>>; 2]>>,
 }
 
 impl<'a> ProfilesAroundObserver<'a> {
     /// For an observer at an altitude, km.
-    pub(super) fn new(profiles: &'a EmissionProfiles, altitude_km: f64) -> Self {
-        Self { profiles, altitude_km, tables: vec![OnceLock::new(); profiles.tables.len()] }
+    pub(super) fn new(whole_profiles: &'a EmissionProfiles, observer_altitude_km: f64) -> Self {
+        let parts_above_and_below = vec![OnceLock::new(); whole_profiles.tables.len()];
+        Self { whole_profiles, observer_altitude_km, parts_above_and_below }
     }
 
     /// The profiles above and below the observer of an energy, given as fractional node index.
     #[inline(never)]
     pub(super) fn at(&self, node: f32) -> [EmissionProfile<'_>; 2] {
         let index = table_index(node);
-        let MipTables { values, tops_km: [prompt_km, red_km], bottom_km } = self.profiles.table(index);
-        let sides = self.tables[index].get_or_init(|| [true, false].map(|is_above| self.side(values, is_above)));
+        let MipTables { values, tops_km: [prompt_km, red_km], bottom_km } = self.whole_profiles.table(index);
+        let parts =
+            self.parts_above_and_below[index].get_or_init(|| [true, false].map(|is_above| self.part(values, is_above)));
         let (bottom_km, top_km) = (*bottom_km, red_km.max(*prompt_km));
-        sides.each_ref().map(|values| EmissionProfile { values, bottom_km, top_km })
+        parts.each_ref().map(|values| EmissionProfile { values, bottom_km, top_km })
     }
 
     /// The mip levels of the part of a profile above or below the observer. A level of the atmosphere stands for half a kilometer on both sides of its
     /// altitude.
-    fn side(&self, values: &[PerEmitter<f32>], is_above: bool) -> Vec<PerEmitter<f32>> {
-        let part = |entry: usize| {
-            let above = (f64::from(BOTTOM_KM) + entry as f64 - 1.0 - self.altitude_km + 0.5).clamp(0.0, 1.0);
+    fn part(&self, values: &[PerEmitter<f32>], is_above: bool) -> Vec<PerEmitter<f32>> {
+        let fraction = |entry: usize| {
+            let above = (f64::from(BOTTOM_KM) + entry as f64 - 1.0 - self.observer_altitude_km + 0.5).clamp(0.0, 1.0);
             if is_above { above } else { 1.0 - above }
         };
         let entries = values[..STARTS[1]].iter().enumerate();
-        mip_levels(entries.map(|(entry, light)| light.map(|value| f64::from(value) * part(entry))).collect())
+        mip_levels(entries.map(|(entry, light)| light.map(|value| f64::from(value) * fraction(entry))).collect())
     }
 }
 
