@@ -57,7 +57,7 @@ impl Stepping {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SnapshotError {
     /// Closed-form phenomena have no state.
-    #[error("the phenomenon has no state")]
+    #[error("this phenomenon is not simulated, so it has no snapshot to restore")]
     NoState,
     /// The snapshot has another version.
     #[error("the snapshot is of version {found}; this program reads {known}")]
