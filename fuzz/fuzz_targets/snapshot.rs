@@ -87,7 +87,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
                 let shutter = Shutter { open: 0.0, close: 0.0 };
                 let view = View::new(CameraParameters::default(), shutter, 0.0, [8, 6], 0);
                 let wind = Wind::new(WindParameters::default(), 1, None);
-                run.export(&view, &Surroundings::from_wind(&wind)).iter().for_each(check);
+                run.export_particles(&view, &Surroundings::from_wind(&wind)).iter().for_each(check);
             }
         }
     });

@@ -95,7 +95,7 @@ impl Run for AuroraRun {
         }
     }
 
-    fn export(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
+    fn export_particles(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
         let t = view.shutter.middle();
         let step = AuroraSimulation::STEP_S;
         if t - self.simulation().time() <= step {

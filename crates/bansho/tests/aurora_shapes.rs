@@ -225,7 +225,7 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90] }]\n",
-            "test.toml:5:10: aurora.0.shapes.1.sheets (shape 2): has 2 sheets, but 1 comes from the previous shape",
+            "test.toml:5:10: aurora.0.shapes.1.sheets (shape 2): has 2 sheets, but 1 is expected after the previous shape",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nsplit = [{ segment = 99 }]\n",
@@ -238,7 +238,7 @@ fn faults_stand_at_their_sheet_and_point() {
         ("[[aurora.shapes]]\nsplit = [{}]\n", "aurora.0.shapes.0.split (shape 1): the first shape has no previous one"),
         (
             "[[aurora.shapes]]\nsheets = [{ svg_file = \"shapes.svg\", svg_path_id = \"middle\" }]\n",
-            "test.toml:4:52: aurora.0.shapes.0.sheets.0.svg_path_id (shape 1, sheet 1): shapes.svg: has no stroke of the id `middle`",
+            "test.toml:4:52: aurora.0.shapes.0.sheets.0.svg_path_id (shape 1, sheet 1): shapes.svg: has no stroke with the id `middle`",
         ),
         (
             "[[aurora.shapes]]\nsheets = [{ svg_path_id = \"left\" }]\n",
@@ -255,11 +255,11 @@ fn faults_stand_at_their_sheet_and_point() {
         ("[[aurora.shapes]]\nsheets = [{ svg_file = \"gone.svg\" }]\n", "gone.svg: no such file"),
         (
             "[[aurora.shapes]]\ntransition_s = 3\n[[aurora.shapes]]\n",
-            "test.toml:4:16: aurora.0.shapes.0.transition_s (shape 1): the first shape exists from the beginning",
+            "test.toml:4:16: aurora.0.shapes.0.transition_s (shape 1): the first shape has no transition",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nlink = [{ from_length_fraction = 0.5 }]\n",
-            "test.toml:5:9: aurora.0.shapes.1.link.0 (shape 2, link 1): has `from_length_fraction`, but no position at which that point arrives",
+            "test.toml:5:9: aurora.0.shapes.1.link.0 (shape 2, link 1): `from_length_fraction` needs `to_length_fraction`",
         ),
         (
             "[[aurora.shapes]]\n[[aurora.shapes]]\nmerge = [{ sheets = [1, 2.5] }]\n",
@@ -269,7 +269,7 @@ fn faults_stand_at_their_sheet_and_point() {
             "[[aurora.shapes]]\nsheets = [{ svg_file = \"shapes.svg\", form = \"arc\" }]\n",
             "has more than one of `points`, `svg_file` and `form`",
         ),
-        ("[[aurora.shapes]]\nsheets = [{ form = \"arcc\" }]\n", "`arcc` is not known, did you mean `arc`?"),
+        ("[[aurora.shapes]]\nsheets = [{ form = \"arcc\" }]\n", "unknown value `arcc`, did you mean `arc`?"),
         (
             "[[aurora.shapes]]\ntransition_s = 3\ntransition_frames = 3\n",
             "has both `transition_s` and `transition_frames`",
@@ -282,11 +282,11 @@ fn faults_stand_at_their_sheet_and_point() {
         ),
         (
             "energy_ev = 10000\n[[aurora.shapes]]\nsheets = [{}, { position_km = [0, 90], energy_factor = [[0, 1], [0.5, 1], [1, 20]] }]\n",
-            "test.toml:5:75: aurora.0.shapes.0.sheets.1.energy_factor.2 (shape 1, sheet 2, energy_factor 3): sheet 2 has electrons of 200000 eV at the fraction 1 of its length",
+            "test.toml:5:75: aurora.0.shapes.0.sheets.1.energy_factor.2 (shape 1, sheet 2, energy_factor 3): at 1 of its length, sheet 2 has electrons of 200000 eV",
         ),
         (
             "energy_ev = 500\n[[aurora.shapes]]\nsheets = [{ energy_factor = [[0.5, 0.1]] }]\n",
-            "sheet 1 has electrons of 50 eV at the fraction 0.5 of its length, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV",
+            "at 0.5 of its length, sheet 1 has electrons of 50 eV (`energy_ev` times the factor here); allowed: 100 to 100000 eV",
         ),
     ] {
         let shown = fault(text);

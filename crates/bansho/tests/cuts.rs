@@ -187,5 +187,5 @@ fn a_turn_that_nobody_asked_for_is_told_with_its_time() {
     assert_eq!(remark(&format!("{tilt}up = [0.0, 0.0, 1.0]\n")), None);
     assert_eq!(remark("target = [0.0, 60.0, 0.0]\n"), None);
     let never = Scene::parse("scene.toml", &scene("", "up = [0, 0, 0]\n", ""), KINDS).err().expect("no direction");
-    assert!(never.to_string().contains("is no direction"), "{never}");
+    assert!(never.to_string().contains("is the zero vector"), "{never}");
 }

@@ -105,7 +105,7 @@ fn what_is_wrong_with_an_obstacle_or_a_light_is_one_located_error() {
         ("[[obstacle]]\nvisible = 1\n", "obstacle.0.visible"),
         (
             "[[light]]\nkind = \"spot\"\ndirection = { keys = [[0, [0, 0, 1]], [1, [0, 0, 0]]] }\n",
-            "light.0.direction: is no direction",
+            "light.0.direction: is the zero vector",
         ),
         ("[[rain]]\nopacity = \"papers\"\n", "rain.0.opacity"),
         ("[[rain]]\noscillation = 2\n", "rain.0.oscillation"),

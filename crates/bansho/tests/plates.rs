@@ -141,7 +141,7 @@ fn what_was_done_with_a_plate_is_told() {
     let told: Vec<String> = remarks::remarks(&compiled, &plan).into_iter().map(|(_, remark)| remark.message).collect();
     let told = told.join("\n");
     for words in
-        ["straight, blended in linear light", "12 x 8 pixels, the image 24 x 16", "`depth_scale = ", "deviate by"]
+        ["straight, blended in linear light", "12 x 8 pixels and the image 24 x 16", "`depth_scale = ", "deviate by"]
     {
         assert!(told.contains(words), "{words}: {told}");
     }

@@ -25,7 +25,7 @@ pub enum FarmError {
         /// The message of the system.
         source: io::Error,
     },
-    /// A file cannot be read, or is no ordinary file.
+    /// A file cannot be read, or is not a regular file.
     #[error("{path}: {source}", path = .path.display())]
     Input {
         /// The file.
@@ -83,17 +83,17 @@ pub enum FarmError {
     },
     /// The processor does not give the same bytes.
     #[error(
-        "this machine draws other bytes than the one that planned the tasks; allowed: a processor and a program that give the same bytes"
+        "this machine does not reproduce the bytes of the machine that planned the tasks; allowed: a processor and a program that give the same bytes"
     )]
     Arithmetic,
     /// The scene, or a file that it names, has changed.
     #[error(
-        "the scene, or a file that it names, is not what the tasks were planned for, so that frames of two scenes would be mixed; \
+        "the scene, or a file that it names, is not what the tasks were planned for, so frames of two scenes would be mixed; \
          plan the tasks again, or restore the scene"
     )]
     SceneChanged,
     /// A task that the plan does not have.
-    #[error("task {index}; the plan has {count}, from 0 on")]
+    #[error("there is no task {index}; allowed: 0 to {}", .count.saturating_sub(1))]
     NoSuchTask {
         /// Its number.
         index: usize,
@@ -101,7 +101,7 @@ pub enum FarmError {
         count: usize,
     },
     /// A tile that a picture does not have.
-    #[error("tile {index}; a picture has {count}, from 0 on")]
+    #[error("there is no tile {index}; allowed: 0 to {}", .count.saturating_sub(1))]
     NoSuchTile {
         /// Its number.
         index: usize,
@@ -117,7 +117,7 @@ pub enum FarmError {
         max: usize,
     },
     /// More tasks than one array may have.
-    #[error("{tasks} tasks; allowed: up to {max}, which are chunks of at least {least_chunk} frames")]
+    #[error("{tasks} tasks; allowed: up to {max} (chunks of at least {least_chunk} frames)")]
     TooManyTasks {
         /// Number of tasks.
         tasks: usize,
@@ -143,13 +143,13 @@ pub enum FarmError {
         available: String,
     },
     /// A path with a line break or another control character, which scripts cannot hold.
-    #[error("{path:?}: control characters are not possible in scripts; allowed: any other name")]
+    #[error("{path:?}: scripts cannot contain control characters; allowed: any other name")]
     ControlCharacters {
         /// The path or argument.
         path: String,
     },
     /// A text that Open Job Description would take for an expression.
-    #[error("`{text}`: Open Job Description takes {{{{ and }}}} for an expression; allowed: any other name or option")]
+    #[error("`{text}`: Open Job Description interprets {{{{ }}}} as an expression; allowed: any other name or option")]
     Braces {
         /// The text.
         text: String,
@@ -171,7 +171,7 @@ pub enum FarmError {
         source: FrameFileError,
     },
     /// The film is to be one file a frame.
-    #[error("{path}: no film; allowed: .mp4, .mov, .webm, .apng, .gif", path = .path.display())]
+    #[error("{path}: not a film format; allowed: .mp4, .mov, .webm, .apng, .gif", path = .path.display())]
     NotAFilm {
         /// The name of the film.
         path: PathBuf,

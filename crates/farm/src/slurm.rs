@@ -218,7 +218,7 @@ fn submit_script(jobs: &[BatchJob], root: &Path) -> Result<Script, FarmError> {
         "#!/bin/sh\n{COMMENT_LINE}# Submits the jobs to Slurm, each to begin when the one before it has succeeded, and prints their numbers.\n\
          set -eu\ncd {}\n\
          if test -h jobs || {{ test -s jobs && ! head -n 1 jobs | grep -q '^# bansho:'; }}; then\n  \
-         echo 'jobs: is there already and was not made by Bansho' >&2\n  exit 1\nfi\nids=\n\
+         echo 'jobs: already exists and was not made by Bansho' >&2\n  exit 1\nfi\nids=\n\
          cancel() {{ test -z \"$ids\" || scancel $ids; }}\ntrap cancel EXIT\n",
         quoted(&script_path(root)?)
     );

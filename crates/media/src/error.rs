@@ -29,7 +29,7 @@ pub enum MediaError {
         path: PathBuf,
     },
     /// No permission to write there.
-    #[error("{path}: not allowed to write there; choose a folder you may write to", path = .path.display())]
+    #[error("{path}: no permission to write there; choose a folder you may write to", path = .path.display())]
     NotAllowed {
         /// The file that was to be written.
         path: PathBuf,
@@ -41,13 +41,13 @@ pub enum MediaError {
         path: PathBuf,
     },
     /// The path is a device, a pipe or a socket.
-    #[error("{path}: is no ordinary file; give another name", path = .path.display())]
+    #[error("{path}: is not a regular file; give another name", path = .path.display())]
     NotAFile {
         /// The file that was to be written.
         path: PathBuf,
     },
     /// The file exists, and was to be created.
-    #[error("{path}: is there already; choose another name", path = .path.display())]
+    #[error("{path}: already exists; choose another name", path = .path.display())]
     AlreadyExists {
         /// The file.
         path: PathBuf,
@@ -59,7 +59,7 @@ pub enum MediaError {
         path: PathBuf,
     },
     /// The file exists, and Bansho did not make it.
-    #[error("{path}: is there already and was not made by Bansho; allowed: another name", path = .path.display())]
+    #[error("{path}: already exists and was not made by Bansho; allowed: another name", path = .path.display())]
     NotMadeByBansho {
         /// The file.
         path: PathBuf,
@@ -117,7 +117,7 @@ pub enum MediaError {
         name: String,
     },
     /// A display format was given scene-linear pixels, or a scene-linear format display pixels.
-    #[error("{path}: this format takes {expected}", path = .path.display())]
+    #[error("{path}: this format requires {expected}", path = .path.display())]
     WrongPicture {
         /// The file that was to be written.
         path: PathBuf,
@@ -125,7 +125,7 @@ pub enum MediaError {
         expected: PictureFormat,
     },
     /// Pixels that are not sRGB for a format that cannot say what else they are.
-    #[error("{path}: this format takes sRGB pixels", path = .path.display())]
+    #[error("{path}: this format requires sRGB pixels", path = .path.display())]
     NotSrgb {
         /// The file that was to be written.
         path: PathBuf,

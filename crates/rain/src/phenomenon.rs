@@ -60,7 +60,7 @@ impl Phenomenon for Rain {
     fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
         let unlit = neighbors.sky.is_dark()
             && neighbors.lights().all(|light| light.intensity.iter().all(|value| *value <= 0.0));
-        let message = "nothing lights it, so it is drawn black; a [[light]], a [sky] or a fire would";
+        let message = "nothing lights it, so it is drawn black; add a [[light]], a [sky] or a fire";
         unlit.then(|| Remark { unless_lit_later: true, ..Remark::new(message) })
     }
 

@@ -12,12 +12,12 @@ use fearless_simd::dispatch;
 use crate::{
     Rain,
     drops::{
+        cell_drops::{CellDrops, DropBatch},
         classes::DropClassState,
         lattice::{CELL_SIZE, LatticeCell},
         shutter_state::ShutterState,
     },
     streaks::{
-        cell_drops::{CellDrops, DropBatch},
         coverage::Streak,
         project::{DropSelection, VisibleStreaks, map_cell_chunks, vector},
     },

@@ -60,7 +60,7 @@ impl Run for RainRun {
     }
 
     /// [`Rain::drops`], with their diameters and opacities.
-    fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
+    fn export_particles(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
         Some(raindrop::point_cloud(&self.rain.drops(view, surroundings), view.export_origin))
     }
 }

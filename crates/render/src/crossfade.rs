@@ -166,8 +166,8 @@ impl Run for CrossfadeRun {
         Ok(Box::new(PreparedCrossfade { deflection, aovs: self.aovs, current, adjacent, current_weight: weight }))
     }
 
-    fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
-        self.current.run.export(view, surroundings)
+    fn export_particles(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
+        self.current.run.export_particles(view, surroundings)
     }
 
     fn as_stepped(&self) -> Option<&dyn Stepped> {

@@ -38,7 +38,10 @@ pub struct PlanOptions {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// The crop is not inside the picture.
-    #[error("the crop {crop:?} reaches outside the picture of {size:?} pixels")]
+    #[error(
+        "the crop of {} x {} pixels at ({}, {}) extends beyond the picture of {} x {} pixels",
+        .crop[2], .crop[3], .crop[0], .crop[1], .size[0], .size[1]
+    )]
     CropOutside {
         /// x, y, width, height.
         crop: [usize; 4],
@@ -46,7 +49,7 @@ pub enum PlanError {
         size: [usize; 2],
     },
     /// The picture is empty or too large.
-    #[error("{width} x {height} pixels: this size is not possible; allowed: 1 to {limit} on a side")]
+    #[error("a picture of {width} x {height} pixels; allowed: 1 to {limit} on a side")]
     Size {
         /// Width.
         width: usize,

@@ -124,12 +124,13 @@ pub fn report_build_error(error: BuildError, path: String, root: &Table, reader:
 fn camera(scene: &Scene, root: &Table, reader: &mut Reader) {
     let [position, target] = [&scene.camera.position, &scene.camera.target].map(|point| point.at(0.0));
     if position == target {
-        let kind = ProblemKind::Conflict("is where the camera stands; allowed: any other point".into());
+        let kind = ProblemKind::Conflict("equals the camera's position; allowed: any other point".into());
         let span = nearest_span(root, "camera.target");
         reader.within("camera", |r| r.within("target", |r| r.report_at(span, kind)));
     }
     if scene.camera.up.values().iter().any(|up| DVec3::from(*up).try_normalize().is_none()) {
-        let kind = ProblemKind::Conflict("is no direction; allowed: any three numbers that are not all 0".into());
+        let kind =
+            ProblemKind::Conflict("is the zero vector; allowed: a vector with at least one nonzero component".into());
         report_build_error(BuildError { key: "up".into(), kind }, "camera".into(), root, reader);
     }
     field_of_view(scene, root, reader);
@@ -168,11 +169,11 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
 fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
     if scene.plate.image.is_none() && scene.plate.depth.is_some() {
         let span = nearest_span(root, "plate.depth");
-        let kind = ProblemKind::Conflict("a depth needs an `image` that it belongs to".into());
+        let kind = ProblemKind::Conflict("`depth` needs an `image`".into());
         reader.within("plate", |r| r.within("depth", |r| r.report_at(span, kind)));
     }
     if scene.plate.image.is_none() && !scene.plate.depth_known.is_empty() {
-        let kind = ProblemKind::Conflict("known depths need an `image` in which they are".into());
+        let kind = ProblemKind::Conflict("`depth_known` needs an `image`".into());
         report_build_error(BuildError { key: "depth_known".into(), kind }, "plate".into(), root, reader);
     }
     if scene.plate.image.is_none() && scene.plate.exposure_ev100 != Auto::Auto {

@@ -147,7 +147,7 @@ pub struct SceneOptions {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LoopError {
     /// A loop shorter than two frames or longer than an hour.
-    #[error("a loop of {seconds} s is out of range; allowed: {min} (two frames) to 3600 s")]
+    #[error("a loop of {seconds} s; allowed: {min} s (two frames) to 3600 s")]
     Length {
         /// The requested length.
         seconds: f64,
@@ -156,7 +156,7 @@ pub enum LoopError {
     },
     /// An animated parameter has different values at the beginning and at the end.
     #[error(
-        "the loop of {seconds} s jumps: {path} differs between its beginning and its end; allowed: equal values at 0 s and at {seconds} s"
+        "the loop of {seconds} s is not seamless: {path} differs between its beginning and its end; allowed: equal values at 0 s and at {seconds} s"
     )]
     NotSeamless {
         /// Length of the loop.

@@ -73,7 +73,7 @@ def _markup() -> list[Case]:
         _drawing("a megabyte a thousand times by an entity", parts((entity + "<svg><desc>", 1), ("&a;", 1000), (f"</desc>{LINE}</svg>", 1)), words="entities are replaced"),
         _drawing("30,000 entities", lines(30_000, lambda index: f"<!ENTITY a{index} 'x'>", "<!DOCTYPE svg [", f"]><svg>{LINE}</svg>"), words="entities; allowed"),
         _drawing("an element of an entity, twice", twice, (0, 3)),
-        _drawing("4,000 namespaces copied by 200,000 elements", parts((f"<svg{prefixes}>", 1), ('<g xmlns:a="b"/>', 200_000), (LINE + "</svg>", 1)), words="namespaces", large=True),
+        _drawing("4,000 namespaces copied by 200,000 elements", parts((f"<svg{prefixes}>", 1), ('<g xmlns:a="b"/>', 200_000), (LINE + "</svg>", 1)), words="namespace prefixes", large=True),
         _drawing("100,000 attributes behind a bracket", _svg("<path a='>' " + "".join(f"a{index}='1' " for index in range(100_000)) + "d='M1 5L9 5'/>"), words="attributes"),
         _drawing("200,000 uses within one another", parts(("<svg>", 1), ("<use>", 200_000), ("</use>", 200_000), ("</svg>", 1)), words="deep", large=True),
         _drawing("600 groups that use one another in a chain", _svg("<defs><path id='g0' d='M1 5L9 5'/>" + "".join(f"<g id='g{index}'><use href='#g{index - 1}'/></g>" for index in range(1, 600)) + "</defs><use href='#g599'/>"), words="deep"),
@@ -150,6 +150,6 @@ def cases() -> list[Case]:
         _drawing("an id of a megabyte", _svg(f'<path id="{"a" * MEGA}" d="L"/>'), words="path"),
         *_style_sheets(),
         *_markup(),
-        Case("svg", "an id that is not there", ["check", "scene.toml"], 3, r"^error: scene\.toml:9:15: aurora\.0\.shapes\.0\.sheets\.0\.svg_path_id .*no stroke of the id `gone`",
+        Case("svg", "an id that is not there", ["check", "scene.toml"], 3, r"^error: scene\.toml:9:15: aurora\.0\.shapes\.0\.sheets\.0\.svg_path_id .*no stroke with the id `gone`",
              {"scene.toml": SCENE + 'svg_path_id = "gone"\n', "drawing.svg": _svg(LINE)}),
     ]

@@ -179,7 +179,7 @@ def _files() -> list[Case]:
         _mesh("binary by the name of a text", "gltf", glb, 3, "JSON"),
         Case("gltf", "burner without triangles", ["check", "scene.toml"], 3, r"^error: scene\.toml:5:8: flame_particles\.0\.burners\.0\.file.*mesh\.gltf",
              {"scene.toml": 'bansho = 2\n[[flame_particles]]\n[[flame_particles.burners]]\nshape = "mesh"\nfile = "mesh.gltf"\n', "mesh.gltf": gltf.changed(nodes=[])}),
-        Case("gltf", "a mesh of an unknown kind", ["check", "scene.toml"], 3, r"^error: scene\.toml:8:8: obstacle\.0\.file.*mesh\.obj.*not a mesh Bansho reads", {"scene.toml": SCENE.format("mesh.obj"), "mesh.obj": "v 0 0 0\n"}),
+        Case("gltf", "a mesh of an unknown kind", ["check", "scene.toml"], 3, r"^error: scene\.toml:8:8: obstacle\.0\.file.*mesh\.obj.*not a supported mesh format", {"scene.toml": SCENE.format("mesh.obj"), "mesh.obj": "v 0 0 0\n"}),
         Case("gltf", "a mesh without a file", ["check", "scene.toml"], 3, r"^error: scene\.toml:\d+:\d+: obstacle\.0\.", {"scene.toml": SCENE.replace('file = "{}"\n', "")}),
     ]
 

@@ -40,7 +40,7 @@ def _names() -> list[Case]:
 
 
 def _places() -> list[Case]:
-    no_file = r"^error: {}: (is no ordinary file|.*allowed)"
+    no_file = r"^error: {}: (is not a regular file|.*allowed)"
     return [
         _out("/dev/null", "/dev/null", 2, r"^error: /dev/null: has no extension"),
         _out("/dev/full", "/dev/full", 2, r"^error: /dev/full: has no extension"),
@@ -54,8 +54,8 @@ def _places() -> list[Case]:
         _out("a link to itself", "a.png", (1, 2), r"^error: a\.png: ", {"a.png": link("a.png")}),
         _out("a folder that is a link to itself", "l/a.png", (1, 2), r"^error: l/a\.png: ", {"l": link("l")}),
         _out("a folder that is a link to nothing", "l/a.png", (0, 1, 2), r"^error: l/a\.png: ", {"l": link("gone")}),
-        _out("/proc", "/proc/a.png", (1, 2), r"^error: /proc/a\.png: (cannot be written|not allowed)"),
-        _out("/sys", "/sys/a.png", (1, 2), r"^error: /sys/a\.png: (cannot be written|not allowed)"),
+        _out("/proc", "/proc/a.png", (1, 2), r"^error: /proc/a\.png: (cannot be written|no permission)"),
+        _out("/sys", "/sys/a.png", (1, 2), r"^error: /sys/a\.png: (cannot be written|no permission)"),
         _out("a file of the kernel", "/proc/self/a/a.png", (1, 2), r"^error: /proc/self/a/a\.png: "),
         Case("output", "a folder that is full", ["render", "scene.toml", "-o", "/dev/stdin/a.png", *ONE], (1, 2), r"^error: /dev/stdin/a\.png: ", {"scene.toml": FLAME}),
         Case("output", "a film without ffmpeg", ["render", "scene.toml", "-o", "a.mp4", *ONE], 1, r"^error: a\.mp4: needs the program `ffmpeg`", {"scene.toml": FLAME}, environment={"PATH": "/nowhere"}),
@@ -96,7 +96,7 @@ def _inputs() -> list[Case]:
         Case("over an input", "particles over a scene, by a link", ["simulate", "scene.toml", "--particles", "a.ply", "--frames", "0"], 2, "^error: .*" + INPUT, {"scene.toml": GAS, "a.ply": link("scene.toml")}),
         Case("over an input", "a snapshot over a scene, by a link", ["render", "scene.toml", "-o", "out/a.png", "--snapshots", "states", "--snapshot-every", "1", "--threads", "2"], (0, 1, 2), r"^error: ",
              {"scene.toml": GAS, "states/state.0.bansho": link("../scene.toml")}, leaves=["out/*", "states/*"]),
-        Case("over an input", "a new scene over a scene", ["new", "scene"], (1, 2), r"^error: scene\.toml: is there already", {"scene.toml": FLAME}),
+        Case("over an input", "a new scene over a scene", ["new", "scene"], (1, 2), r"^error: scene\.toml: already exists", {"scene.toml": FLAME}),
         Case("over an input", "a new scene over a link to nothing", ["new", "scene"], (0, 1, 2), r"^error: scene\.toml", {"scene.toml": link("gone.toml")}),
         Case("over an input", "a new scene in a pipe", ["new", "scene"], (1, 2), r"^error: scene\.toml: ", {"scene.toml": pipe}),
         Case("over an input", "manual pages in a file", ["man", "scene.toml"], (1, 2), r"^error: scene\.toml", {"scene.toml": FLAME}),

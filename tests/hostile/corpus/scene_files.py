@@ -6,7 +6,7 @@ from . import drawings, exr, gltf, meshes, plates, png
 from .case import CLOSED, OPEN_PIPE, Case, Content, folder, link, parts, pipe, sparse, unix_socket, with_mode
 from .scene_text import FLAME
 
-# Kinds of what is no ordinary file. A name for each, how it is made at the place of the file, and whether it could be waited for.
+# Kinds of what is not a regular file. A name for each, how it is made at the place of the file, and whether it could be waited for.
 ODD: list[tuple[str, Content, bool]] = [
     ("a folder", folder, False),
     ("a pipe", pipe, True),

@@ -163,7 +163,7 @@ mod tests {
         let exported = |run: &AuroraRun, middle: f64| {
             let shutter = Shutter { open: middle - 0.5, close: middle + 0.5 };
             let view = View::new(CameraParameters::default(), shutter, 0.0, SIZE, 0);
-            run.export(&view, &Surroundings::from_wind(&wind)).unwrap()
+            run.export_particles(&view, &Surroundings::from_wind(&wind)).unwrap()
         };
         assert_eq!(exported(&early, 1.0), exported(&late, 1.0));
         assert_ne!(exported(&early, 0.0), exported(&late, 1.0));

@@ -83,8 +83,8 @@ pub enum ShapeErrorKind {
     },
     /// The wrong number of sheets.
     #[error(
-        "has {}, but {expected} from the previous shape; allowed: the same number, or `split` and `merge` for the difference",
-        counted(*.found, "sheet"), expected = come(*.expected)
+        "has {}, but {expected} after the previous shape; allowed: that number, or `split` and `merge` for the difference",
+        counted(*.found, "sheet"), expected = are_expected(*.expected)
     )]
     Unmatched {
         /// Number of sheets drawn.
@@ -94,8 +94,8 @@ pub enum ShapeErrorKind {
     },
     /// The wrong number of sheets in drawing order.
     #[error(
-        "has {}, but with `correspondence = \"drawing_order\"` each of the {} of the previous shape is drawn again as one stroke: one that splits with \
-         its gap as a segment, those that merge each by itself; allowed: {expected}, or `correspondence = \"automatic\"`, where splits and merges \
+        "has {}, but with `correspondence = \"drawing_order\"` each of the {} of the previous shape must be drawn again as one stroke: \
+         a splitting sheet includes its gap, and merging sheets are drawn separately; allowed: {expected}, or `correspondence = \"automatic\"`, where splits and merges \
          change the number",
         counted(*.found, "sheet"), counted(*.expected, "sheet")
     )]
@@ -196,18 +196,16 @@ pub enum ShapeErrorKind {
         sheet: usize,
     },
     /// A link with a position of arrival, but without a point.
-    #[error("has `to_length_fraction`, but no point that arrives there; allowed: together with `from_length_fraction`")]
+    #[error("`to_length_fraction` needs `from_length_fraction`")]
     ArrivalWithoutPoint,
     /// A link with a point of a sheet that does not split, but without its position of arrival.
-    #[error(
-        "has `from_length_fraction`, but no position at which that point arrives; allowed: together with `to_length_fraction`, or alone where the sheet splits"
-    )]
+    #[error("`from_length_fraction` needs `to_length_fraction`, unless the sheet splits there")]
     PointWithoutArrival,
     /// Linked points that exchange their order.
-    #[error("two linked points of a sheet exchange their order; allowed: points in the order of the sheet")]
+    #[error("two links of a sheet cross; allowed: points in the order of the sheet")]
     LinksCross,
     /// A link with correspondence by drawing order.
-    #[error("sheets and points are matched in drawing order; links are allowed with `correspondence = \"automatic\"`")]
+    #[error("links have no effect in drawing order; allowed: with `correspondence = \"automatic\"`")]
     LinkInOrder,
     /// A sheet with more than one of points, SVG file and form.
     #[error("sheet {sheet} has more than one of `points`, `svg_file` and `form`; allowed: one of them")]
@@ -222,13 +220,11 @@ pub enum ShapeErrorKind {
     #[error("has both `transition_s` and `transition_frames`; allowed: one of them")]
     SecondsAndFrames,
     /// A transition time of the first shape.
-    #[error(
-        "the first shape exists from the beginning; allowed: in later shapes; `hold_s` is the time for which the first one is held"
-    )]
+    #[error("the first shape has no transition; allowed: in later shapes (`hold_s` sets how long the first is held)")]
     TimeBeforeFirstShape,
     /// Electrons of an energy outside the tables.
     #[error(
-        "sheet {sheet} has electrons of {energy_ev:.0} eV at the fraction {length_fraction} of its length, the aurora's `energy_ev` times this factor; allowed: 100 to 100000 eV"
+        "at {length_fraction} of its length, sheet {sheet} has electrons of {energy_ev:.0} eV (`energy_ev` times the factor here); allowed: 100 to 100000 eV"
     )]
     EnergyOutside {
         /// The entry of the shape's list of sheets.
@@ -257,14 +253,14 @@ pub enum ShapeErrorKind {
     )]
     LinesOutsideTable21,
     /// A loop whose length is not a positive number.
-    #[error("a loop of {seconds} s; allowed: more than 0")]
+    #[error("a loop of {seconds} s is too short; allowed: more than 0 s")]
     LoopLength {
         /// Requested length, s.
         seconds: f64,
     },
     /// An animated value that differs between the start and the end of the loop.
     #[error(
-        "the loop of {seconds} s jumps: its first and last values differ; allowed: the same value at 0 s and at {seconds} s"
+        "the loop of {seconds} s is not seamless: the value differs between its beginning and its end; allowed: the same value at 0 s and at {seconds} s"
     )]
     LoopJumps {
         /// Length of the loop, s.
@@ -275,7 +271,7 @@ pub enum ShapeErrorKind {
     Asset(#[from] AssetError),
 }
 
-/// "n come" with the verb in agreement.
-fn come(count: usize) -> String {
-    if count == 1 { "1 comes".to_owned() } else { format!("{count} come") }
+/// "n are expected" with the verb in agreement.
+fn are_expected(count: usize) -> String {
+    if count == 1 { "1 is expected".to_owned() } else { format!("{count} are expected") }
 }

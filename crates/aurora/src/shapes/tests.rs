@@ -188,7 +188,7 @@ fn loops_close_whether_the_sequence_returns_or_not() {
     assert!((round.at(2.0).sheets[0].points[0].y - 80.0).abs() < 1e-9);
     let error =
         Sequence::new(&begun(&shapes), &MorphingParameters::default(), EXTENT_KM, &MemoryAssets::default(), Some(0.0));
-    assert_eq!(error.unwrap_err().to_string(), "loop: a loop of 0 s; allowed: more than 0");
+    assert_eq!(error.unwrap_err().to_string(), "loop: a loop of 0 s is too short; allowed: more than 0 s");
 }
 
 fn random_shape(key: Key, case: u64, step: u32, sheets: usize) -> ShapeParameters {

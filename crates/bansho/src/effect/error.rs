@@ -36,7 +36,7 @@ pub enum EffectError {
     },
     /// A simulation cannot go back in time. [`LiveEffect::restart`](super::LiveEffect::restart) begins again.
     #[error(
-        "time: {time} s is before {reached} s, to which simulations have been stepped; allowed: later times, or a restart"
+        "time: {time} s is too early; simulations have already reached {reached} s; allowed: later times, or `restart`"
     )]
     Backward {
         /// The time that was asked for, s.
@@ -79,7 +79,7 @@ pub enum EffectError {
     #[error("the length of a loop cannot be changed while it runs; allowed: another effect")]
     FixedLoop,
     /// The simulations have not been run up to time 0 yet; see [`Effect::preroll_in_pieces`](super::Effect::preroll_in_pieces).
-    #[error("{steps} steps of the preroll are left; call `preroll` until none is")]
+    #[error("the preroll is not finished ({steps} steps left); call `preroll` until none are left")]
     Preroll {
         /// Steps that are left.
         steps: u64,

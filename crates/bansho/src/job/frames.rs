@@ -18,16 +18,16 @@ pub struct FrameListError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FrameListErrorKind {
     /// It does not have the form of a range.
-    #[error("is no frame or range of frames")]
+    #[error("is not a frame or a range of frames")]
     Form,
     /// Its first frame comes after its last.
-    #[error("runs backward")]
+    #[error("ends before it begins")]
     Backward,
     /// Its step is zero.
     #[error("has a step of zero")]
     ZeroStep,
     /// The list has more frames than any shot.
-    #[error("makes more than {MAX_FRAMES} frames")]
+    #[error("selects more than {MAX_FRAMES} frames")]
     TooMany,
 }
 

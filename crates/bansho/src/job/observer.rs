@@ -73,7 +73,7 @@ fn frames_are(count: usize) -> String {
 #[non_exhaustive]
 pub enum Warning {
     /// Frames outside the scene's range.
-    #[error("{} outside the scene's range, {first} to {last}; the scene is continued there", frames_are(*.count))]
+    #[error("{} outside the scene's range, {first} to {last}; the scene continues beyond its range", frames_are(*.count))]
     OutsideScene {
         /// How many.
         count: usize,

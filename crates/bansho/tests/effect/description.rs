@@ -33,13 +33,13 @@ fn bad_input_is_an_error_that_names_the_field_and_leaves_everything_as_it_was() 
         opened(Effect::new(FlameSheetParameters { height: -1.0, ..torch() })),
         "flame_sheet.0.height: -1 is out of range",
     );
-    says(
-        opened(Effect::new(torch()).size(0, 0)),
-        "0 x 0 pixels: this size is not possible; allowed: 1 to 16384 on a side",
-    );
+    says(opened(Effect::new(torch()).size(0, 0)), "a picture of 0 x 0 pixels; allowed: 1 to 16384 on a side");
     says(opened(Effect::new(torch()).exposure_ev100(f64::NAN)), "picture.exposure_ev100: NaN");
     says(opened(Effect::new(torch()).shutter(-1.0)), "camera.shutter_s: -1 is out of range");
-    says(opened(Effect::new(torch()).with("flame_sheet", torch())), "the name \"flame_sheet\" is taken");
+    says(
+        opened(Effect::new(torch()).with("flame_sheet", torch())),
+        "another phenomenon is already called \"flame_sheet\"",
+    );
     says(opened(Effect::new(torch()).looping(f64::INFINITY)), "loop of inf s");
 
     let mut live = Effect::new(torch()).size(SIZE, SIZE).open().unwrap();
@@ -87,7 +87,7 @@ fn a_scene_can_be_built_and_shown() {
     let more = Effect::from_scene(scene.clone()).with("rain", RainParameters::default());
     assert_eq!(more.scene().unwrap().instances.len(), 2);
     for (name, parameters, says) in [
-        ("torch", torch(), "the name \"torch\" is taken"),
+        ("torch", torch(), "another phenomenon is already called \"torch\""),
         ("a.b", torch(), "cannot be a name"),
         ("second", FlameSheetParameters { width: -1.0, ..torch() }, "second.width: -1 is out of range"),
     ] {

@@ -19,7 +19,7 @@ pub struct Mesh {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MeshError {
     /// No triangle has an area.
-    #[error("it has no triangles with an area")]
+    #[error("it has no triangles with nonzero area")]
     NoTriangles,
     /// Too many triangles.
     #[error("it has {found} triangles; at most {MAX_TRIANGLES} are read")]
@@ -34,7 +34,7 @@ pub enum MeshError {
         found: usize,
     },
     /// A triangle refers to a vertex that does not exist.
-    #[error("triangle {} refers to vertex {}, and there are {vertex_count}", triangle + 1, u64::from(*vertex) + 1)]
+    #[error("triangle {} refers to vertex {}, but the mesh has only {vertex_count}", triangle + 1, u64::from(*vertex) + 1)]
     VertexIndexOutOfRange {
         /// Index of the triangle, from 0.
         triangle: usize,
@@ -44,7 +44,7 @@ pub enum MeshError {
         vertex_count: usize,
     },
     /// A coordinate is not finite or beyond 1e6 m.
-    #[error("vertex {} is not finite or beyond 1e6 m", vertex + 1)]
+    #[error("vertex {} is infinite, NaN or more than 1e6 m from the origin", vertex + 1)]
     VertexOutOfBounds {
         /// Index of the vertex, from 0.
         vertex: usize,

@@ -15,13 +15,13 @@ pub struct Stroke {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DrawingRemark {
     /// Elements that are no lines.
-    #[error("its elements {} are no lines, and left out", .names.join(", "))]
+    #[error("its elements {} are not lines and are ignored", .names.join(", "))]
     OtherElements {
         /// Their names, each once.
         names: Vec<&'static str>,
     },
     /// Paths of a single point.
-    #[error("{paths} path{} of a single point {} left out", if *.paths == 1 { "" } else { "s" }, if *.paths == 1 { "is" } else { "are" })]
+    #[error("{paths} path{} with only one point {} ignored", if *.paths == 1 { "" } else { "s" }, if *.paths == 1 { "is" } else { "are" })]
     Dots {
         /// Their number.
         paths: usize,

@@ -97,10 +97,10 @@ pub enum PictureRemark {
     #[error("its alpha is used: where it is transparent, what is behind it is seen, or the picture is transparent ({})", blending(*.0))]
     AlphaUsed(PictureAlpha),
     /// Its color profile is damaged or of a kind that is not supported.
-    #[error("its ICC profile cannot be used ({0}), so its values are taken as sRGB")]
+    #[error("its ICC profile cannot be used ({0}), so its values are interpreted as sRGB")]
     Profile(String),
     /// It states colors that are unknown or contradictory.
-    #[error("{0}, so its values are taken as sRGB")]
+    #[error("{0}, so its values are interpreted as sRGB")]
     Colors(String),
     /// Its values exceed the white of a display.
     #[error("its values are {transfer}: {white} cd/m^2 is display white")]
@@ -113,7 +113,7 @@ pub enum PictureRemark {
     /// Its Exif data are damaged.
     #[error(
         "its Exif data are damaged{} ({reason}); orientation and exposure may be missing",
-        at.map(|at| format!(" at their byte {at}")).unwrap_or_default()
+        at.map(|at| format!(" at byte {at} of the Exif block")).unwrap_or_default()
     )]
     Exif {
         /// Where: bytes from the beginning of their TIFF header, which Exif data count offsets from; `None` if unknown.
@@ -122,7 +122,7 @@ pub enum PictureRemark {
         reason: String,
     },
     /// Its orientation has no meaning.
-    #[error("its orientation is {0} (allowed: 1 to 8), so it is not turned")]
+    #[error("its orientation is {0} (allowed: 1 to 8), so it is not rotated")]
     Orientation(u32),
     /// Its pixels are not square.
     #[error(
@@ -183,7 +183,7 @@ pub enum AssetProblem {
     #[error("no such file")]
     Missing,
     /// There is no such file, and its name has the placeholder of another program for the frame number.
-    #[error("no such file; `{own}` stands for the frame number, not `{placeholder}`")]
+    #[error("no such file; write `{own}` for the frame number instead of `{placeholder}`")]
     OtherPlaceholder {
         /// The placeholder in its name.
         placeholder: String,
@@ -199,7 +199,7 @@ pub enum AssetProblem {
     #[error("cannot be read: {0}")]
     Unreadable(String),
     /// It is not a regular file but a folder, a pipe or a device.
-    #[error("is {found}; allowed: an ordinary file")]
+    #[error("is {found}; allowed: a regular file")]
     NotAFile {
         /// What it is, such as `a pipe`.
         found: &'static str,
@@ -213,7 +213,7 @@ pub enum AssetProblem {
         limit: u64,
     },
     /// It would exceed the memory limit for the inputs of a scene.
-    #[error("takes {} of memory once it is read; allowed: up to {}{}", memory::format_bytes(*.bytes), memory::format_bytes(*.limit), other_inputs_note(*.others))]
+    #[error("would take {} of memory; allowed: up to {}{}", memory::format_bytes(*.bytes), memory::format_bytes(*.limit), other_inputs_note(*.others))]
     Memory {
         /// Upper bound of the memory that reading it takes, bytes.
         bytes: u64,
@@ -223,13 +223,13 @@ pub enum AssetProblem {
         others: u64,
     },
     /// It would need more memory than the system has.
-    #[error("takes {} of memory once it is read, more than is available", memory::format_bytes(*.bytes))]
+    #[error("would take {} of memory, more than is available", memory::format_bytes(*.bytes))]
     NoMemory {
         /// Upper bound of the memory that reading it takes, bytes.
         bytes: u64,
     },
     /// It is outside the folder that a scene is confined to.
-    #[error("lies outside {root}, the folder that this scene is confined to; allowed: files within it")]
+    #[error("lies outside {root}, the asset root of this scene; allowed: files within it")]
     Outside {
         /// The folder.
         root: String,
@@ -244,13 +244,13 @@ pub enum AssetProblem {
         instead: Vec<&'static str>,
     },
     /// The requested stroke is not in the drawing.
-    #[error("has no stroke of the id `{0}`")]
+    #[error("has no stroke with the id `{0}`")]
     NoStroke(String),
     /// The extension of its name is not that of a supported picture format.
-    #[error("is not a picture Bansho reads (allowed: .png, .jpg, .jpeg, .exr, .webp, .tif, .tiff)")]
+    #[error("is not a supported picture format; allowed: .png, .jpg, .jpeg, .exr, .webp, .tif, .tiff")]
     UnknownKind,
     /// The extension of its name is not that of a supported format of depth.
-    #[error("is not a depth Bansho reads (allowed: .exr, .png, .pfm, .npy, .tif, .tiff)")]
+    #[error("is not a supported depth format; allowed: .exr, .png, .pfm, .npy, .tif, .tiff")]
     UnknownDepthKind,
     /// It is of a format that is known, and not read.
     #[error("is {format}, which Bansho does not read; {advice}")]
@@ -271,7 +271,7 @@ pub enum AssetProblem {
         layers: Vec<String>,
     },
     /// None of its layers is known to be what is needed.
-    #[error("has no layer that is known to be {use_of_layer}; it has {}; `{key}` in [plate] chooses one", counted_names(.layers))]
+    #[error("has no layer that is recognized as {use_of_layer}; it has {}; select one with `{key}` in [plate]", counted_names(.layers))]
     NoKnownLayer {
         /// What it would be used for.
         use_of_layer: &'static str,
@@ -281,7 +281,7 @@ pub enum AssetProblem {
         layers: Vec<String>,
     },
     /// The extension of its name is not that of a supported mesh format.
-    #[error("is not a mesh Bansho reads (allowed: .glb, .gltf)")]
+    #[error("is not a supported mesh format; allowed: .glb, .gltf")]
     UnknownMeshKind,
     /// It contains no usable mesh.
     #[error("contains no usable mesh: {0}")]

@@ -29,7 +29,7 @@ pub enum VectorLevel {
 
 /// The machine has no such vector instructions, or kernels are not compiled for them.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("this machine has no vector level \"{requested}\"; allowed: {}", list(.available))]
+#[error("vector level \"{requested}\" is not available on this machine; allowed: {}", list(.available))]
 pub struct VectorLevelError {
     /// The level that was requested, as it was written.
     pub requested: String,

@@ -77,13 +77,13 @@ impl Default for Fractal {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoiseError {
     /// Number of octaves.
-    #[error("there are {0} octaves; allowed are 1 to {MAX_OCTAVES}")]
+    #[error("{0} octaves; allowed: 1 to {MAX_OCTAVES}")]
     Octaves(u32),
     /// Lacunarity.
-    #[error("the lacunarity is {0}; allowed are 1 to 16")]
+    #[error("a lacunarity of {0}; allowed: 1 to 16")]
     Lacunarity(u32),
     /// Gain.
-    #[error("the gain is {0}; it must be a number from 0 to 16")]
+    #[error("a gain of {0}; allowed: 0 to 16")]
     Gain(f32),
     /// A period does not fit the lattice in the finest octave.
     #[error("a period of {period} cells is too long for {octaves} octaves")]

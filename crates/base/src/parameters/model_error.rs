@@ -95,7 +95,7 @@ pub enum ParameterErrorKind {
         next: f64,
     },
     /// The length of a loop is not above 0.
-    #[error("a loop of {seconds} s; allowed: more than 0")]
+    #[error("a loop of {seconds} s is too short; allowed: more than 0 s")]
     LoopLength {
         /// The requested length, s.
         seconds: f64,

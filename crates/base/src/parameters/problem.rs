@@ -51,7 +51,7 @@ pub enum ProblemKind {
         allowed: Vec<String>,
     },
     /// A kind of phenomenon that this program was built without.
-    #[error("`{key}` is left out of this build; enable the feature `{feature}` of the crate `bansho`")]
+    #[error("`{key}` is not supported by this build; enable the feature `{feature}` of the crate `bansho`")]
     FeatureDisabled {
         /// Key of the kind.
         key: &'static str,
@@ -79,7 +79,7 @@ pub enum ProblemKind {
         unit: &'static str,
     },
     /// A name is not one of those allowed.
-    #[error("`{}` is not known{}; allowed: {}", excerpt(.value), did_you_mean(.nearest), .allowed.join(", "))]
+    #[error("unknown value `{}`{}; allowed: {}", excerpt(.value), did_you_mean(.nearest), .allowed.join(", "))]
     NotOneOf {
         /// The name.
         value: String,
@@ -90,7 +90,7 @@ pub enum ProblemKind {
     },
     /// A keyframed value differs at the start and the end of a seamless loop.
     #[error(
-        "the loop of {seconds} s jumps: its first and its last moment differ; allowed: the same value at 0 s and at {seconds} s"
+        "the loop of {seconds} s is not seamless: the value differs between its beginning and its end; allowed: the same value at 0 s and at {seconds} s"
     )]
     LoopJumps {
         /// Length of the loop, s.
@@ -110,7 +110,7 @@ pub enum ProblemKind {
     #[error("{0}")]
     Curve(#[from] crate::math::curve::CurveError),
     /// A curve decreases although it must not.
-    #[error("decreases between x = {from} and x = {to}; it must not decrease from point to point")]
+    #[error("decreases between x = {from} and x = {to}; allowed: values that never decrease")]
     NotRising {
         /// x where the decrease starts.
         from: f64,
@@ -118,7 +118,7 @@ pub enum ProblemKind {
         to: f64,
     },
     /// Two phenomena have the same name.
-    #[error("the name \"{name}\" is taken by another phenomenon; each needs its own")]
+    #[error("another phenomenon is already called \"{name}\"; allowed: a unique name")]
     DuplicateName {
         /// The name.
         name: String,

@@ -57,7 +57,7 @@ impl Stepping {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SnapshotError {
     /// Closed-form phenomena have no state.
-    #[error("the phenomenon has no state")]
+    #[error("this phenomenon is not simulated, so it has no snapshot to restore")]
     NoState,
     /// The snapshot has another version.
     #[error("the snapshot is of version {found}; this program reads {known}")]
@@ -275,7 +275,7 @@ pub trait Run: Send + Sync {
 
     /// Its particles at the middle of the exposure `view.shutter`, for export; `None` if it never has any. What exists only around a camera, as drops of rain
     /// do, is exported as far as the view shows it; a simulation exports all of its particles.
-    fn export(&self, _view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
+    fn export_particles(&self, _view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
         None
     }
 
@@ -326,8 +326,8 @@ impl<P: Run + ?Sized> Run for Arc<P> {
         (**self).prepare_part(view, surroundings, observer)
     }
 
-    fn export(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
-        (**self).export(view, surroundings)
+    fn export_particles(&self, view: &View, surroundings: &Surroundings) -> Option<PointCloud> {
+        (**self).export_particles(view, surroundings)
     }
 
     fn as_stepped(&self) -> Option<&dyn Stepped> {

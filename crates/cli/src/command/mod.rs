@@ -29,7 +29,7 @@ fn thread_pool(threads: Option<u16>) -> anyhow::Result<rayon::ThreadPool> {
     let count = threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
     pool.with_context(|| match threads {
-        Some(count) => format!("--threads {count}: the system starts no more threads; allowed: fewer"),
+        Some(count) => format!("--threads {count}: the system cannot start that many threads; allowed: fewer"),
         None => "the system starts no thread for each core; --threads states how many".to_owned(),
     })
 }

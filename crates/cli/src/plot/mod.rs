@@ -31,7 +31,7 @@ use bansho::job::ErrorCategory;
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlotError {
     /// A range without numbers.
-    #[error("{option}: {from} to {to} {unit} is no range; allowed: a start below its end")]
+    #[error("{option}: {from} to {to} {unit} is an empty range; allowed: a start below its end")]
     EmptyRange {
         /// The option of its start.
         option: &'static str,
@@ -41,7 +41,7 @@ pub(crate) enum PlotError {
     },
     /// A cone that ends before it begins to.
     #[error(
-        "--inner-cone-deg: full intensity up to {inner} degrees cannot end at {outer}; allowed: up to --outer-cone-deg"
+        "--inner-cone-deg: {inner} degrees is wider than --outer-cone-deg ({outer}); allowed: up to --outer-cone-deg"
     )]
     Cones { inner: f64, outer: f64 },
     /// More rows than a table may have.
@@ -53,13 +53,13 @@ pub(crate) enum PlotError {
         most: f64,
     },
     /// The name of the output is not that of a format.
-    #[error("{}: the extension says the format; allowed: .svg, .png or .csv, or `-` for CSV on standard output", path.display())]
+    #[error("{}: the extension selects the format; allowed: .svg, .png or .csv, or `-` for CSV on standard output", path.display())]
     Extension { path: PathBuf },
     /// The name of a texture is not that of a PNG.
     #[error("{}: a picture without axes is a PNG; allowed: .png", path.display())]
     TextureExtension { path: PathBuf },
     /// A figure with more panels than a picture has room for.
-    #[error("{}: a picture of {panels} panels; allowed: fewer, or .svg", path.display())]
+    #[error("{}: {panels} panels do not fit into a PNG; allowed: fewer, or .svg", path.display())]
     Panels { path: PathBuf, panels: usize },
     /// A scene without a phenomenon that has such curves.
     #[error("{scene}: has no {kind}; allowed: a scene with one")]

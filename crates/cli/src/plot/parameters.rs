@@ -102,9 +102,9 @@ fn add_value<'a>(node: &'a Node, steps: Vec<Step>, found: &mut Vec<Stated<'a>>) 
 /// Why a path means no keyed value.
 #[derive(Clone, Debug, thiserror::Error)]
 enum PathError {
-    #[error("the scene states no such value for --path{}; keyed in it: {keyed}", did_you_mean(.hint))]
+    #[error("--path matches no value of the scene{}; keyed in it: {keyed}", did_you_mean(.hint))]
     Unknown { hint: Option<String>, keyed: String },
-    #[error("is not keyed, as --path needs it{}; keyed in the scene: {keyed}", did_you_mean(.hint))]
+    #[error("is not keyed; --path needs a keyed parameter{}; keyed in the scene: {keyed}", did_you_mean(.hint))]
     NotKeyed { hint: Option<String>, keyed: String },
 }
 

@@ -14,7 +14,7 @@ fn a_new_scene_passes_the_check_and_is_never_overwritten() {
     folder.write("fire.toml", "mine");
     let again = folder.run(&["new", "fire"]);
     assert_eq!((again.code, again.errors()), (Some(1), 1));
-    assert!(again.stderr.contains("fire.toml: is there already"), "{}", again.stderr);
+    assert!(again.stderr.contains("fire.toml: already exists"), "{}", again.stderr);
     assert_eq!(folder.files("")["fire.toml"], b"mine");
 }
 

@@ -39,13 +39,13 @@ impl SharedTable for LightParameters {
         let error = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
         let mut errors = Vec::new();
         if self.is_directed() && !self.has_valid_direction() {
-            let reason = "is no direction; allowed: any three numbers that are not all 0".to_owned();
+            let reason = "is the zero vector; allowed: a vector with at least one nonzero component".to_owned();
             errors.push(error("direction", reason));
         }
         let is_wider = self.inner_cone_deg > self.outer_cone_deg;
         if self.kind == LightKind::Spot && is_wider && is_stated("inner_cone_deg") {
             let reason = format!(
-                "a spot with full intensity up to {} degrees cannot end at {}; allowed: up to `outer_cone_deg`",
+                "{} degrees is wider than `outer_cone_deg` ({}); allowed: up to `outer_cone_deg`",
                 self.inner_cone_deg, self.outer_cone_deg
             );
             errors.push(error("inner_cone_deg", reason));

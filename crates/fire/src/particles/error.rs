@@ -63,7 +63,7 @@ pub enum ParticleErrorKind {
     Asset(#[from] AssetError),
     /// A keyframed value differs at the start and the end of a seamless loop.
     #[error(
-        "the loop of {seconds} s jumps: its first and its last moment differ; allowed: the same value at 0 s and at {seconds} s"
+        "the loop of {seconds} s is not seamless: the value differs between its beginning and its end; allowed: the same value at 0 s and at {seconds} s"
     )]
     LoopJumps {
         /// Length of the loop, s.

@@ -161,7 +161,7 @@ impl Run for FlameParticlesRun {
         Ok(Box::new(PreparedGas::of_exposure(&exposure, rendering, view, surroundings, observer)?))
     }
 
-    fn export(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
+    fn export_particles(&self, view: &View, _surroundings: &Surroundings) -> Option<PointCloud> {
         let t = view.shutter.middle();
         let gas = self.exposure(view.shutter).middle;
         let GasParticles { velocity: [u, v, w], temperature, density, .. } = gas.particles;

@@ -308,7 +308,10 @@ mod tests {
         assert_eq!(found.orientation, Orientation::Turned90);
         let [PictureRemark::Exif { at, .. }] = &found.remarks[..] else { panic!("{found:?}") };
         assert_eq!(*at, Some(entry + 8));
-        assert!(found.remarks[0].to_string().contains(&format!("damaged at their byte {} (", entry + 8)), "{found:?}");
+        assert!(
+            found.remarks[0].to_string().contains(&format!("damaged at byte {} of the Exif block (", entry + 8)),
+            "{found:?}"
+        );
     }
 
     #[test]

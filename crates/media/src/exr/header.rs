@@ -231,7 +231,7 @@ pub(crate) struct FileHeader {
 /// Why a header is unreadable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum HeaderError {
-    #[error("it does not begin as an OpenEXR file")]
+    #[error("it is not an OpenEXR file")]
     NotExr,
     #[error("its header is truncated or damaged")]
     Damaged,

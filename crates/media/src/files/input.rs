@@ -15,7 +15,7 @@ use bansho_base::host::{assets::AssetProblem, memory};
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// It is not a regular file.
-    #[error("is {found}; allowed: an ordinary file")]
+    #[error("is {found}; allowed: a regular file")]
     NotAFile {
         /// Its type, such as `a pipe`.
         found: &'static str,
@@ -116,7 +116,7 @@ fn special_kind(found: &Metadata) -> &'static str {
 
 #[cfg(not(unix))]
 fn special_kind(_: &Metadata) -> &'static str {
-    "no ordinary file"
+    "not a regular file"
 }
 
 #[cfg(test)]
@@ -134,7 +134,7 @@ mod tests {
         fs::write(&path, b"12345").unwrap();
         assert_eq!(read(&path, 5).unwrap(), b"12345");
         assert_eq!(message(&path, 4), "has 5 bytes; allowed: up to 4 bytes");
-        assert_eq!(message(folder.path(), 4), "is a folder; allowed: an ordinary file");
+        assert_eq!(message(folder.path(), 4), "is a folder; allowed: a regular file");
         assert!(matches!(read(&folder.path().join("b"), 5), Err(InputError::Io(_))));
         find(&path).unwrap();
         assert!(find(folder.path()).is_err());
@@ -155,13 +155,13 @@ mod tests {
         let (socket, link) = (folder.path().join("socket"), folder.path().join("zero"));
         let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
         std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
-        assert_eq!(message(&socket, 9), "is a socket; allowed: an ordinary file");
-        assert_eq!(message(&link, 9), "is a device; allowed: an ordinary file");
+        assert_eq!(message(&socket, 9), "is a socket; allowed: a regular file");
+        assert_eq!(message(&link, 9), "is a device; allowed: a regular file");
         // Opening a pipe that nobody writes to would wait for ever.
         let pipe = folder.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
-        assert_eq!(message(&pipe, 9), "is a pipe; allowed: an ordinary file");
+        assert_eq!(message(&pipe, 9), "is a pipe; allowed: a regular file");
     }
 
     #[test]

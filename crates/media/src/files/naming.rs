@@ -301,7 +301,7 @@ pub enum LiteralPart {
     #[error("a single # before a digit is part of the name; ## or %d is the frame number")]
     Hash,
     /// A placeholder in the name of a folder.
-    #[error("the folder `{folder}` is called so: only the name of the file may have a frame number")]
+    #[error("placeholders in the folder `{folder}` are taken literally; only the file name may contain a frame number")]
     Folder {
         /// The name of the folder.
         folder: String,

@@ -96,10 +96,11 @@ fn hostile_files_are_refused_with_a_reason() {
             .contains("accessors[0].count reaches beyond its buffer")
     );
     assert!(
-        reason(&glb(&document("", 0, ""), &bytes()), "glb").contains("triangle 1 refers to vertex 1, and there are 0")
+        reason(&glb(&document("", 0, ""), &bytes()), "glb")
+            .contains("triangle 1 refers to vertex 1, but the mesh has only 0")
     );
     let lines = document("", 3, "").replace(r#""indices":1"#, r#""indices":1,"mode":1"#);
-    assert_eq!(reason(&glb(&lines, &bytes()), "glb"), "contains no usable mesh: it has no triangles with an area");
+    assert_eq!(reason(&glb(&lines, &bytes()), "glb"), "contains no usable mesh: it has no triangles with nonzero area");
     assert!(reason(b"{", "gltf").starts_with("is damaged"));
     assert!(reason(b"", "obj").contains("allowed: .glb, .gltf"));
 }
@@ -149,7 +150,7 @@ fn a_fault_says_where_it_is_and_what_is_allowed() {
     named_beyond[40] = 3;
     assert!(
         reason(&glb(&document("", 3, ""), &named_beyond), "glb")
-            .contains("triangle 1 refers to vertex 4, and there are 3")
+            .contains("triangle 1 refers to vertex 4, but the mesh has only 3")
     );
 }
 

@@ -15,13 +15,13 @@ pub(super) enum JpegFault {
     Long { at: usize, bytes: usize },
     #[error("the bits after the last block of a scan are not those that fill a byte, at byte {at}")]
     Padding { at: usize },
-    #[error("no code of its Huffman table is at byte {at}")]
+    #[error("invalid Huffman code at byte {at}")]
     NoCode { at: usize },
     #[error("a block has more than 64 coefficients at byte {at}")]
     Coefficients { at: usize },
-    #[error("a coefficient is larger than those of any picture at byte {at}")]
+    #[error("coefficient out of range at byte {at}")]
     Range { at: usize },
-    #[error("restart marker {found} is where {expected} must be at byte {at}")]
+    #[error("restart marker {found} instead of {expected} at byte {at}")]
     Restart { at: usize, found: u8, expected: u8 },
 }
 

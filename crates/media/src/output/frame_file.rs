@@ -27,7 +27,7 @@ pub enum FrameFileError {
     #[error(transparent)]
     Input(#[from] InputError),
     /// The file is not as Bansho writes it.
-    #[error("is no frame of Bansho, or damaged: {0}")]
+    #[error("was not written by Bansho, or is damaged: {0}")]
     Damaged(String),
 }
 

@@ -44,7 +44,7 @@ fn check_attributes(text: &str) -> Result<(), AssetProblem> {
         }
     }
     if prefixes.len() > MAX_PREFIXES {
-        return Err(damaged(format!("it has {} prefixes of namespaces; allowed: {MAX_PREFIXES}", prefixes.len())));
+        return Err(damaged(format!("it has {} namespace prefixes; allowed: {MAX_PREFIXES}", prefixes.len())));
     }
     // At least one prefix where any is declared.
     if declared * prefixes.len() > MAX_NAMESPACES {
@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn namespaces_are_bounded_by_what_elements_copy() {
         let prefixes: String = (0..300).map(|n| format!(" xmlns:a{n}='x'")).collect();
-        assert!(error(&format!("<svg{prefixes}/>")).contains("300 prefixes of namespaces; allowed: 256"));
+        assert!(error(&format!("<svg{prefixes}/>")).contains("300 namespace prefixes; allowed: 256"));
         let few: String = (0..200).map(|n| format!(" xmlns:a{n} = 'x'")).collect();
         let text = format!("<svg{few}>{}</svg>", "<g xmlns:a1='y'/>".repeat(100_000));
         assert!(error(&text).contains("declares namespaces 100200 times; allowed: 100000 times"), "{}", error(&text));

@@ -72,8 +72,8 @@ fn check_precision([min, max]: [DVec2; 2]) -> Result<(), AssetProblem> {
         return Ok(());
     }
     Err(damaged(format!(
-        "its strokes are {distance:.6} from 0 and extend over {extent:.6}; allowed: up to {MAX_DISTANCE} times their extent away. Move \
-         them near 0, or remove the transforms, uses and units that keep them from being moved"
+        "its strokes are {distance:.6} from the origin and extend over {extent:.6}; allowed: up to {MAX_DISTANCE} times their extent away. Move \
+         them near the origin, or remove the transforms, uses and units that keep them from being moved"
     )))
 }
 

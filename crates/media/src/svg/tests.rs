@@ -99,7 +99,7 @@ fn what_is_left_out_is_told_once() {
         "<svg>{defs}<rect/><path d='M1 1'/><path d='m2 2h0z'/><text/><rect/><path d='M3 3H4'/></svg>"
     ));
     assert_eq!(drawing.remarks, [OtherElements { names: vec!["rect", "text"] }, Dots { paths: 2 }]);
-    assert_eq!(drawing.remarks[1].to_string(), "2 paths of a single point are left out");
+    assert_eq!(drawing.remarks[1].to_string(), "2 paths with only one point are ignored");
     let plain =
         decoded("<svg><defs><path id='a' d='M0 0H1'/></defs><use href='#a'/><path d='M0 0c1 1 2 2 0 0'/></svg>");
     assert_eq!((plain.remarks.len(), plain.strokes.len()), (0, 2));
@@ -189,7 +189,7 @@ fn strokes_far_from_the_page_are_moved_and_refused_where_single_precision_would_
     let arc_end = DVec2::new(3.0, 0.5);
     assert!(drawing.strokes[0].points.iter().any(|point| (*point - drawing.min).distance(arc_end) < 1e-5));
     let turned = format!("<svg><path transform='rotate(1)' d='M{x} 0L{} 0 {} 1'/></svg>", x + 1.0, x + 1.0);
-    assert!(error(&turned).contains("Move them near 0"));
+    assert!(error(&turned).contains("Move them near the origin"));
 }
 
 #[test]

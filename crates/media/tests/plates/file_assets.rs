@@ -63,14 +63,15 @@ fn a_missing_sequence_in_the_way_of_another_program_is_told_how_it_is_written() 
     let assets = FileAssets::new(folder.path());
     for (name, own) in [("p.%04d.png", "####"), ("p.$F4.exr", "####"), ("p.@@@.png", "###"), ("p.<frame>.png", "####")]
     {
-        let hint = format!("no such file; `{own}` stands for the frame number, not `{}`", &name[2..name.len() - 4]);
+        let hint =
+            format!("no such file; write `{own}` for the frame number instead of `{}`", &name[2..name.len() - 4]);
         assert_eq!(assets.picture(name, 1).unwrap_err().problem.to_string(), hint);
         assert_eq!(assets.find(name, 1).unwrap_err().problem.to_string(), hint);
         assert_eq!(assets.digest(name, 1).unwrap_err().problem.to_string(), hint);
     }
     assert_eq!(
         assets.depth("d.%d.pfm", 1, None).unwrap_err().problem.to_string(),
-        "no such file; `#` stands for the frame number, not `%d`"
+        "no such file; write `#` for the frame number instead of `%d`"
     );
     // A file of that very name is one.
     fs::write(folder.path().join("p.%04d.png"), png_bytes(&display(3, 2))).unwrap();
@@ -102,7 +103,7 @@ fn pictures_that_are_only_kept_make_room_and_meshes_that_are_used_do_not() {
     assets.picture("b.png", 0).unwrap();
     let small = InputLimits { memory_bytes: one - 1, root: None };
     let told = FileAssets::with_limits(folder.path(), small).picture("a.png", 0).unwrap_err().to_string();
-    assert!(told.contains("a.png: takes ") && told.contains(" of memory once it is read; allowed: up to "), "{told}");
+    assert!(told.contains("a.png: would take ") && told.contains(" of memory; allowed: up to "), "{told}");
 }
 
 #[cfg(unix)]

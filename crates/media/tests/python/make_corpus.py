@@ -352,7 +352,7 @@ def chunks() -> None:
     picture("cicp_linear.png", with_chunks(cicp(12, 8)), opaque(to_srgb(shown, P3, D65)), tolerance=1e-5, encoding="linear")
     picture("cicp_first.png", with_chunks(cicp(12, 13), (b"sRGB", b"\0"), (b"gAMA", struct.pack(">I", 100000))), np.clip(srgb(decode_srgb(shown), P3), 0, 1))
     for name, body in [("unknown_primaries", bytes([77, 13, 0, 1])), ("unknown_transfer", bytes([1, 99, 0, 1])), ("narrow", bytes([9, 16, 0, 0]))]:
-        picture(f"cicp_{name}.png", with_chunks((b"cICP", body)), opaque(shown), remark="taken as sRGB")
+        picture(f"cicp_{name}.png", with_chunks((b"cICP", body)), opaque(shown), remark="interpreted as sRGB")
     add("cicp_ycbcr.png", with_chunks((b"cICP", bytes([9, 16, 9, 1]))), kind="picture", error="its cICP states YCbCr")
     for gamma in (0.35, 0.55, 1 / 1.8, 1 / 2.6):
         scaled = round(gamma * 100000)
@@ -443,7 +443,7 @@ def conventions(rgb: dict, stack) -> None:
         picture(f"renderer_{name}.exr", exr(channels), expected, tolerance=1e-6, encoding="linear", depth=values(z))
         depth(f"depth_renderer_{name}.exr", exr(channels), z)
     passes = exr({**layer("AO", other), **layer("Emit", rgb)})
-    add("renderer_without_beauty.exr", passes, kind="picture", error="it has AO, Emit; `image_layer`")
+    add("renderer_without_beauty.exr", passes, kind="picture", error="it has AO, Emit; select one with `image_layer`")
     picture("renderer_layer.exr", passes, expected, tolerance=1e-6, encoding="linear", image_layer="Emit")
     add("renderer_no_such_layer.exr", passes, kind="picture", image_layer="Beauty", error="has no layer `Beauty` of colors; it has AO, Emit")
 
@@ -717,7 +717,7 @@ def refused() -> None:
         ("photo.heic", b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "a HEIC photograph"), ("photo_named.jpg", b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "a HEIC photograph"),
         ("picture.avif", b"\0\0\0\x1cftypavif\0\0\0\0", "an AVIF picture"), ("photo.nef", b"MM\0*", "a camera's raw file"), ("scan.dpx", b"SDPX", "a DPX or Cineon scan"),
         ("document.psd", b"8BPS\0\x01", "a Photoshop document"), ("picture.jxl", b"\xff\x0a", "a JPEG XL picture"), ("picture.bmp", b"BM", "convert it to PNG"),
-        ("picture.hdr", b"#?RADIANCE\n", "a Radiance picture"), ("picture.xyz", b"?", "is not a picture Bansho reads"),
+        ("picture.hdr", b"#?RADIANCE\n", "a Radiance picture"), ("picture.xyz", b"?", "is not a supported picture format"),
     ]:
         add(name, data, kind="picture", error=words)
     photo = saved(Image.fromarray(np.kron(ramp(), np.ones((16, 16, 1), np.uint8))), "JPEG", quality=95)

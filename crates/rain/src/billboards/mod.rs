@@ -20,6 +20,7 @@ use stochastic_simplification::StochasticSimplification;
 
 use crate::{
     drops::{
+        cell_drops::{DropBatch, FADE_IN},
         classes::DropClassState,
         lattice::{CELL_SIZE, LatticeCell},
         shutter_state::{DropState, Sphere, VisibleCell},
@@ -27,7 +28,6 @@ use crate::{
     lanes::{LaneArray, ZERO_LANES},
     streaks::{
         bin::{StreakChunk, StreakChunkBuilder},
-        cell_drops::{DropBatch, FADE_IN},
         project::StreakProjection,
     },
 };

@@ -4,7 +4,7 @@
 use bansho_base::math::{DVec2, DVec3};
 
 use super::{
-    cell::MAX_UNSEEN_BEND,
+    cell_motion::MAX_UNSEEN_BEND,
     gust::{GustField, GustLanes, blossom, slopes},
 };
 

@@ -9,7 +9,7 @@ use bansho_base::{
 };
 
 use super::{
-    cell::{CellState, Deviation, DeviationLanes, Deviations},
+    cell_motion::{CellState, Deviation, DeviationLanes, Deviations},
     classes::{DropClassState, DropClasses},
     gust::{GustField, GustLanes, GustState, horizontal},
     gust_cells::{GustLine, Path},

@@ -1,5 +1,5 @@
 //! Light of lamps and fires that the rain scatters toward the camera: integrated along the lines of sight at the corners of a grid, and kept while camera,
-//! lamps and rain stay the same.
+//! lamps and rain stay the same. Around each place at which a lamp is seen, also beyond the seam of a panorama, there is a finer grid: its halo.
 
 use std::{
     ops::Range,

@@ -5,7 +5,7 @@ pub(crate) mod drop_lighting;
 pub mod drop_phase_function;
 pub(crate) mod equiangular;
 pub mod extinction;
-pub(crate) mod halos;
+pub(crate) mod halo_corrections;
 pub(crate) mod in_scattering;
 pub(crate) mod ray_segments;
 pub(crate) mod single_scattering;

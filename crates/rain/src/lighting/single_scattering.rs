@@ -18,7 +18,7 @@ use fearless_simd::{Level, dispatch};
 use super::{
     drop_lighting::DropLighting,
     extinction::{ExtinctionProfile, RainExtinction},
-    halos::{HaloCorrector, HaloRows},
+    halo_corrections::{HaloCorrector, HaloRows},
     in_scattering::{InScatterIntegrator, LampScattering, LampScatteringCache},
     ray_segments::{MediumBounds, OpticalDepthTable, RaySegments, any_range},
     sky::SkyLighting,

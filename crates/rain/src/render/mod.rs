@@ -1,4 +1,4 @@
 //! Rendering of one frame.
 
-mod exposure_parts;
 pub(crate) mod prepared;
+mod streak_parts;

@@ -13,7 +13,7 @@ use bansho_base::{
 };
 use fearless_simd::{Level, Simd, dispatch};
 
-use super::exposure_parts::exposure_parts;
+use super::streak_parts::streak_parts;
 use crate::{
     Rain,
     aovs::write_aovs,
@@ -71,7 +71,7 @@ impl<'a> PreparedRain<'a> {
         let shutter_state = rain.shutter_state(view, surroundings);
         let mut textured = None;
         let mut streaks = Streaks::default();
-        let parts = exposure_parts(view);
+        let parts = streak_parts(view);
         if rain.parameters.method == Method::Textures {
             textured = rain.textures.as_ref().map(|textures| {
                 let (rate, gain) = (rain.rate(view.shutter.middle()), rain.parameters.opacity_gain);

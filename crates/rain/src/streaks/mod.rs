@@ -1,7 +1,6 @@
 //! Streaks: drops as an exposure shows them. Projection into the picture, binning into tiles, rasterization.
 
 pub(crate) mod bin;
-pub(crate) mod cell_drops;
 pub mod coverage;
 pub mod oscillation;
 pub(crate) mod project;

@@ -13,13 +13,13 @@ use fearless_simd::{Level, dispatch};
 
 use super::{
     bin::{StreakChunk, StreakChunkBuilder},
-    cell_drops::{CellDrops, DropBatch},
     oscillation::Oscillation,
     project_lanes::{DropPaths, StreakBatch},
     rasterize::StreakSegment,
 };
 use crate::{
     drops::{
+        cell_drops::{CellDrops, DropBatch},
         classes::DropClassState,
         lattice::{CELL_SIZE, LatticeCell},
         shutter_state::{ShutterState, Sphere, VisibleCell},

@@ -250,7 +250,7 @@ fn every_method_lists_the_same_drops_with_any_number_of_threads_and_exports_them
     for method in [Method::Drops, Method::Billboards, Method::Textures] {
         let rain = rain(streaks(method, 20.0), 3);
         assert_eq!(one_thread.install(|| rain.drops(&view, &surroundings)), drops, "{method:?}");
-        let cloud = RainRun::new(Arc::new(rain)).export(&view, &surroundings).unwrap();
+        let cloud = RainRun::new(Arc::new(rain)).export_particles(&view, &surroundings).unwrap();
         assert_eq!(cloud.len(), drops.len());
         let last = drops.len() - 1;
         assert_eq!(cloud.positions[last], drops[last].position.as_vec3().to_array());

@@ -36,8 +36,10 @@ impl Shot {
         let publications = self.publications(view.shutter, &Unobserved);
         let surroundings = self.surroundings(&view, &publications, None);
         let each = self.runs.iter().zip(&surroundings);
-        each.filter_map(|(run, surroundings)| Some((run.info().name.to_owned(), run.run.export(&view, surroundings)?)))
-            .collect()
+        each.filter_map(|(run, surroundings)| {
+            Some((run.info().name.to_owned(), run.run.export_particles(&view, surroundings)?))
+        })
+        .collect()
     }
 
     /// The lights with which phenomena light each other, at the frame that the shot was advanced to: of each flame the points that approximate its emission,

@@ -97,12 +97,12 @@ const FARTHEST: f64 = 1e7;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DepthDoubt {
     /// No value is a depth.
-    #[error("it hides nothing, since none of its {} values is a depth: {}", .0.total(), listed(.0))]
+    #[error("it hides nothing, since none of its {} values is a valid depth: {}", .0.total(), listed(.0))]
     HidesNothing(DepthValues),
     /// All of it is nearer than the camera draws.
     #[error(
-        "it hides everything, since all of it is nearer than {farthest:.2e} m, and nothing is drawn nearer than {near} m; `depth_scale` states the meters of its \
-         unit"
+        "it hides everything, since all of it is nearer than {farthest:.2e} m, and nothing is drawn nearer than {near} m; `depth_scale` sets the \
+         meters per unit"
     )]
     TooNear {
         /// Its largest distance, m.
@@ -112,7 +112,7 @@ pub enum DepthDoubt {
     },
     /// All of it is farther than anything.
     #[error(
-        "it hides nothing, since all of it is farther than {nearest:.2e} m; `depth_scale` states the meters of its unit"
+        "it hides nothing, since all of it is farther than {nearest:.2e} m; `depth_scale` sets the meters per unit"
     )]
     TooFar {
         /// Its smallest distance, m.
@@ -149,10 +149,10 @@ fn listed(values: &DepthValues) -> String {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub(super) enum KnownDepthError {
     /// There is no depth.
-    #[error("a plate without depth has no scale to find; allowed: with `depth`, or an image that has one")]
+    #[error("a plate without depth cannot be fitted; allowed: with `depth`, or an image that has one")]
     NoDepth,
     /// The depth is not inverse.
-    #[error("finds scale and shift of an inverse depth alone; allowed: with `depth_kind = \"inverse\"`")]
+    #[error("applies only to inverse depth; allowed: with `depth_kind = \"inverse\"`")]
     NotInverse,
     /// There is a single point.
     #[error("has a single point; allowed: 2 or more")]
@@ -370,7 +370,7 @@ mod tests {
             DepthValues::of(values).doubt(scale, 0.05).map(|doubt| doubt.to_string())
         };
         for (values, words) in [
-            ([0.0, 0.0, 0.0], "none of its 3 values is a depth: all are 0"),
+            ([0.0, 0.0, 0.0], "none of its 3 values is a valid depth: all are 0"),
             ([f32::NAN; 3], "all are not a number"),
             ([f32::INFINITY; 3], "all are infinite"),
             ([0.0, f32::NAN, 0.0], "2 0, 1 not a number"),

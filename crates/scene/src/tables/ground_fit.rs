@@ -68,8 +68,8 @@ const TUKEY_CUTOFF: f64 = 4.685;
 pub(super) enum GroundFitError {
     /// No ground is visible to the camera.
     #[error(
-        "scale and shift of the depth are not stated, and the camera sees no ground at {height} m from which they could be found; allowed: `depth_known`, \
-         or `depth_scale` and `depth_shift`"
+        "`depth_scale` and `depth_shift` are not set and cannot be found from the ground at {height} m: the camera sees none of it; allowed: \
+         `depth_known`, or `depth_scale` and `depth_shift`"
     )]
     NotSeen {
         /// Height of the ground, m.
@@ -77,8 +77,8 @@ pub(super) enum GroundFitError {
     },
     /// Too few pixels agree with the ground.
     #[error(
-        "scale and shift of the depth are not stated, and {:.1} % of the pixels below the horizon agree with the ground at {height} m, from which they would be \
-         found; allowed: at least {:.0} %, with the camera of the photograph; or `depth_known`, or `depth_scale` and `depth_shift`",
+        "`depth_scale` and `depth_shift` are not set and cannot be found from the ground at {height} m: only {:.1} % of the pixels below the \
+         horizon agree; allowed: at least {:.0} %, with the camera of the photograph; or `depth_known`, or `depth_scale` and `depth_shift`",
         100.0 * .share, 100.0 * MIN_AGREEING_FRACTION
     )]
     TooFew {
@@ -89,7 +89,7 @@ pub(super) enum GroundFitError {
     },
     /// The values of the pixels that agree do not follow the distance of the ground.
     #[error(
-        "scale and shift of the depth are not stated, and its values do not follow the distance of the ground at {height} m, from which they would be found; \
+        "`depth_scale` and `depth_shift` are not set and cannot be found from the ground at {height} m: the values do not follow its distance; \
          allowed: `depth_known`, or `depth_scale` and `depth_shift`"
     )]
     Flat {
@@ -383,7 +383,8 @@ mod tests {
         let found = fit(&values(&wall, 0.0, 0.01), SIZE, SIZE, &view, 0.0);
         assert!(matches!(found, Err(GroundFitError::TooFew { .. } | GroundFitError::Flat { .. })), "{found:?}");
         let message = GroundFitError::TooFew { share: 0.042, height: 0.5 }.to_string();
-        assert!(message.contains("4.2 % of the pixels below the horizon agree with the ground at 0.5 m"), "{message}");
+        let expected = "from the ground at 0.5 m: only 4.2 % of the pixels below the horizon agree; allowed";
+        assert!(message.contains(expected), "{message}");
         // Larger values are farther: it is no inverse depth.
         let depths = scene_depth(&view, &[], SIZE);
         let farther: Vec<f32> = depths.iter().map(|depth| *depth as f32).collect();

@@ -73,7 +73,7 @@ pub enum PlateRemark {
     },
     /// The depth has another size than the image.
     #[error(
-        "`depth` has {} x {} pixels, the image {} x {}: each pixel of the picture takes the nearest of its values",
+        "`depth` has {} x {} pixels and the image {} x {}: the nearest depth value is used for each pixel",
         .depth[0], .depth[1], .image[0], .image[1]
     )]
     DepthSize {
@@ -247,13 +247,13 @@ fn check_shape(path: &str, [width, height]: [usize; 2], image: [usize; 2]) -> Re
         return Ok(());
     }
     let turned =
-        if [height, width] == image { " (the image is turned by its Exif orientation, or the depth is)" } else { "" };
+        if [height, width] == image { " (the image is rotated by its Exif orientation, or the depth is)" } else { "" };
     let [image_width, image_height] = image;
     Err(conflict(
         "depth",
         format!(
             "{path}: has {width} x {height} pixels; allowed: {image_width} x {image_height}, the size of the image, or the \
-             same shape{turned}"
+             same aspect ratio{turned}"
         ),
     ))
 }

@@ -38,7 +38,7 @@ pub enum JobError {
         suggestion: Option<PathBuf>,
     },
     /// The scene is not UTF-8.
-    #[error("{path}:{line}: the scene is not UTF-8 from this line on; allowed: text in UTF-8", path = .path.display())]
+    #[error("{path}:{line}: is not valid UTF-8 from this line on; allowed: UTF-8", path = .path.display())]
     NotUtf8 {
         /// The scene's file.
         path: PathBuf,

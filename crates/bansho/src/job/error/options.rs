@@ -29,7 +29,7 @@ pub enum SheetKind {
 #[non_exhaustive]
 pub enum OptionError {
     /// Layers or AOVs in a format that has no channels for them.
-    #[error("{channels} need a format with many channels, and {path} has none; allowed: .exr", path = .path.display())]
+    #[error("{path}: this format has no channels for {channels}; allowed: .exr", path = .path.display())]
     ChannelsUnsupported {
         /// Which channels.
         channels: ChannelKind,
@@ -38,7 +38,7 @@ pub enum OptionError {
     },
     /// Metadata of a video or a sheet, which contains many frames.
     #[error(
-        "metadata is written beside the picture of each frame, and {path} contains many frames; allowed: .png, .exr, one file a frame",
+        "metadata is written beside the picture of each frame, and {path} contains many frames; allowed: .png or .exr with one file per frame",
         path = .path.display()
     )]
     MetadataUnsupported {
@@ -68,7 +68,7 @@ pub enum OptionError {
     },
     /// An output exists and was not made by Bansho.
     #[error(
-        "{path}{} already, without the mark of files that Bansho made; allowed: another name",
+        "{path}{} not made by Bansho; allowed: another name",
         and_others(*.others), path = .path.display()
     )]
     NotMadeByBansho {
@@ -78,7 +78,7 @@ pub enum OptionError {
         others: usize,
     },
     /// The format cannot hold a sheet of tiles.
-    #[error("{path}: a sheet is one picture; allowed: {allowed}", path = .path.display())]
+    #[error("{path}: a contact sheet or flipbook needs a still picture format; allowed: {allowed}", path = .path.display())]
     SheetFormat {
         /// The output.
         path: PathBuf,
@@ -97,7 +97,7 @@ pub enum OptionError {
     },
     /// A sheet with more tiles than there are frames in the list.
     #[error(
-        "a sheet of {tiles} tiles for {frames} frames; allowed: 1 to {frames} tiles, or a single frame from which consecutive ones follow"
+        "a sheet of {tiles} tiles for {frames} frames; allowed: 1 to {frames} tiles, or a single start frame, from which consecutive frames are taken"
     )]
     TooFewFrames {
         /// Requested number of tiles.
@@ -120,11 +120,11 @@ pub enum OptionError {
         max: usize,
     },
     /// Encoded alpha for a view that does not encode.
-    #[error("the view `raw` encodes nothing, so its alpha is linear; allowed: linear, or another view")]
+    #[error("the view `raw` applies no encoding, so its alpha is linear; allowed: linear, or another view")]
     RawAlpha,
     /// Linear light in a format that only has colors for display.
     #[error(
-        "the view `raw` is linear light in ACEScg, which {path} cannot say; allowed: .exr, .png or .apng, or another view",
+        "the view `raw` is linear light in ACEScg, which {path} cannot record; allowed: .exr, .png or .apng, or another view",
         path = .path.display()
     )]
     RawFormat {
@@ -135,7 +135,7 @@ pub enum OptionError {
     #[error("no frame is selected; allowed: at least one")]
     NoFrames,
     /// A simulation of a scene without particles.
-    #[error("nothing in this scene has particles to write; allowed: a scene with flame_particles, aurora or rain")]
+    #[error("this scene has no particles to export; allowed: a scene with flame_particles, aurora or rain")]
     NoParticles,
     /// An interval of zero frames between snapshots.
     #[error("snapshots every {0} frames; allowed: 1 or more")]
@@ -147,8 +147,8 @@ pub enum OptionError {
 
 fn and_others(others: usize) -> String {
     match others {
-        0 => ": exists".to_owned(),
-        _ => format!(" and {}: exist", counted(others, "other file")),
+        0 => ": already exists and was".to_owned(),
+        _ => format!(" and {}: already exist and were", counted(others, "other file")),
     }
 }
 

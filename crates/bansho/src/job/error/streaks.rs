@@ -76,15 +76,13 @@ pub enum StreaksError {
     #[error("{0} variants; allowed: 1 to 1000")]
     Variants(u32),
     /// The vector toward the light is zero.
-    #[error("the vector toward the light has no length; allowed: three numbers that are not all 0")]
+    #[error("the light direction is the zero vector; allowed: a vector with at least one nonzero component")]
     LightDirection,
     /// The amplitude of the oscillation is out of range.
     #[error("an oscillation of {0}; allowed: 0 to 1")]
     Oscillation(f64),
     /// Oscillating drops without a light.
-    #[error(
-        "an oscillation changes the brightness of drops in a light, not their opacity, and there is none; allowed: with a light direction"
-    )]
+    #[error("oscillation changes only lit textures, and no light direction is set; allowed: with a light direction")]
     OscillationWithoutLight,
     /// Oscillating drops of the paper's opacity.
     #[error(

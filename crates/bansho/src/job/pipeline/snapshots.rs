@@ -194,7 +194,7 @@ impl Snapshots {
 /// The contents of a regular file: reading a pipe would block, reading a device might not end.
 fn read(path: &Path) -> io::Result<Vec<u8>> {
     if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is no ordinary file"));
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "is not a regular file"));
     }
     fs::read(path)
 }

@@ -19,16 +19,16 @@ pub enum Interpolation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CurveError {
     /// There are no points.
-    #[error("there must be at least one point")]
+    #[error("has no points; allowed: at least 1")]
     Empty,
     /// A point does not lie after the one before it.
-    #[error("point {} must lie after point {index}: each needs a larger position or time than the one before", index + 1)]
+    #[error("point {} is not after point {index}; allowed: ascending positions or times", index + 1)]
     NotAscending {
         /// The offending point.
         index: usize,
     },
     /// A number is infinite or not a number.
-    #[error("point {} is not made of finite numbers", index + 1)]
+    #[error("point {} has an infinite or NaN coordinate; allowed: finite numbers", index + 1)]
     NotFinite {
         /// The offending point.
         index: usize,
@@ -341,7 +341,7 @@ mod tests {
         assert_eq!(error(&[[-1e308, 0.0], [1e308, 1.0]]), CurveError::OutOfRange { index: 1 });
         assert_eq!(
             error(&[[1.0, 0.0], [0.0, 0.0]]).to_string(),
-            "point 2 must lie after point 1: each needs a larger position or time than the one before"
+            "point 2 is not after point 1; allowed: ascending positions or times"
         );
     }
 

@@ -53,7 +53,7 @@ pub enum WindChangeError {
     #[error("the wind of a seamless loop cannot be changed while it runs")]
     Loop,
     /// A time, a component of the velocity or the turbulence intensity is infinite or not a number.
-    #[error("a wind of numbers that are not finite; allowed: finite numbers")]
+    #[error("the wind has an infinite or NaN value; allowed: finite numbers")]
     NotFinite,
 }
 

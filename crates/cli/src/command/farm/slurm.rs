@@ -43,7 +43,10 @@ const MAX_ARRAY_SIZE: usize = 1001;
 /// Plans the tasks of a shot, writes their scripts, and submits them.
 pub(crate) fn run(args: &SlurmArgs) -> anyhow::Result<()> {
     if args.render.scene.as_os_str() == "-" {
-        return Err(UsageError("tasks read the scene, too; allowed: a file in a shared folder".to_owned()).into());
+        return Err(UsageError(
+            "the scene is standard input, which tasks cannot read; allowed: a file in a shared folder".to_owned(),
+        )
+        .into());
     }
     // Before anything is drawn.
     args.sbatch.iter().chain(&args.partition).try_for_each(|option| task::check_printable(option))?;
@@ -115,7 +118,7 @@ fn check_slurm(args: &SlurmArgs) -> anyhow::Result<()> {
     test.args(["--test-only", "--wrap=true", "--time=1"]).args(partition).args(&args.sbatch);
     match test.stdin(Stdio::null()).stdout(Stdio::null()).output() {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Err(UsageError(
-            "--submit: there is no `sbatch` on the path; allowed: a machine with the commands of Slurm, or only to write the scripts, without --submit"
+            "--submit: there is no `sbatch` on the path; run this on a machine with Slurm, or omit --submit to only write the scripts"
                 .to_owned(),
         )
         .into()),
@@ -148,7 +151,7 @@ fn check_no_active_jobs(folder: &FarmFolder, is_needed: bool) -> anyhow::Result<
     }
     let ids = active.join(" ");
     Err(UsageError(format!(
-        "jobs {ids} of this shot are queued or running; allowed: to wait for them, or `scancel {ids}`"
+        "jobs {ids} of this shot are queued or running; wait for them, or cancel them with `scancel {ids}`"
     ))
     .into())
 }

@@ -47,7 +47,7 @@ fn the_steps_of_a_template_draw_the_bytes_of_one_process() {
     }
     let beyond = tile("--tile=2", "--frames=0");
     assert_eq!(beyond.code, Some(2));
-    assert!(beyond.stderr.contains("tile 2; a picture has 2, from 0 on"), "{}", beyond.stderr);
+    assert!(beyond.stderr.contains("there is no tile 2; allowed: 0 to 1"), "{}", beyond.stderr);
     fs::remove_dir_all(folder.path("out/scene/states")).unwrap();
     assert_eq!(snapshots("--frames=0-8", "--tiles=2x1"), "0 snapshots written\n", "all frames are whole");
     folder.succeed(&["farm", "finish", "scene.toml", out, "--tiles=2x1", "--film=a.apng", "--contact-sheet=4"]);
@@ -93,5 +93,5 @@ fn a_machine_is_checked_against_a_template() {
         other.stderr
     );
     let other = folder.run(&["farm", "check", "--out=shot/a.####.png", &token, &made_by, "--arithmetic=00"]);
-    assert!(other.code == Some(1) && other.stderr.contains("draws other bytes"), "{}", other.stderr);
+    assert!(other.code == Some(1) && other.stderr.contains("does not reproduce the bytes"), "{}", other.stderr);
 }

@@ -56,7 +56,7 @@ fn a_missing_plate_is_named() {
 #[test]
 fn a_camera_that_looks_nowhere_is_refused() {
     let error = refused(&FLAME.replace("target = [0.0, 0.8, 0.0]", "target = [0.0, 0.8, 3.0]"), 3);
-    says(&error, &["scene.toml:10:10: camera.target: ", "where the camera stands", "allowed: "]);
+    says(&error, &["scene.toml:10:10: camera.target: ", "equals the camera's position", "allowed: "]);
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn a_scene_that_is_no_text_is_told_with_its_line() {
     std::fs::write(folder.path("scene.toml"), b"bansho = 2\n# caf\xe9\n").unwrap();
     let run = folder.run(&["check", "scene.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
-    says(&run.stderr, &["scene.toml:2: ", "not UTF-8", "allowed: "]);
+    says(&run.stderr, &["scene.toml:2: ", "is not valid UTF-8 from this line on", "allowed: "]);
 }
 
 #[test]
@@ -151,19 +151,19 @@ fn misused(arguments: &[&str], parts: &[&str]) {
 
 #[test]
 fn frames_that_run_backward_are_refused() {
-    misused(&["--frames", "9-1"], &["`9-1` runs backward", "0-239x10"]);
+    misused(&["--frames", "9-1"], &["`9-1` ends before it begins", "0-239x10"]);
     misused(&["--frames", "1-9x0"], &["step of zero"]);
-    misused(&["--frames", "first"], &["`first` is no frame"]);
+    misused(&["--frames", "first"], &["`first` is not a frame"]);
 }
 
 #[test]
 fn sizes_crops_and_loops_out_of_range_are_refused() {
     misused(&["--size", "0x5"], &["1 to 16384"]);
     misused(&["--size", "1000000000x5"], &["1 to 16384"]);
-    misused(&["--crop", "40,0,9,9"], &["reaches outside the picture", "48"]);
+    misused(&["--crop", "40,0,9,9"], &["extends beyond the picture of 48 x 64 pixels"]);
     misused(&["--crop", "1,2,3"], &["x,y,width,height"]);
-    misused(&["--loop", "0"], &["out of range", "3600"]);
-    misused(&["--loop", "-1"], &["-1 s is out of range"]);
+    misused(&["--loop", "0"], &["a loop of 0 s; allowed: ", "3600"]);
+    misused(&["--loop", "-1"], &["a loop of -1 s; allowed: "]);
     misused(&["--loop", "soon"], &["a number of seconds"]);
     misused(&["--threads", "0"], &["1..=1024"]);
 }
@@ -261,7 +261,7 @@ fn gas_that_cannot_be_says_what_can() {
     folder.write("mesh.gltf", line);
     let run = folder.run(&["check", "scene.toml"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
-    says(&run.stderr, &["scene.toml:5:8: ", "mesh.gltf", "no triangles with an area"]);
+    says(&run.stderr, &["scene.toml:5:8: ", "mesh.gltf", "no triangles with nonzero area"]);
 }
 
 /// Plates `plate.0000.png` and so on, drawn from the scene itself.

@@ -83,7 +83,7 @@ fn pipes_and_devices_are_refused_wherever_a_file_is_named() {
         folder.write("svg.toml", aurora);
         for scene in ["link.toml", "png.toml", "exr.toml", "gltf.toml"] {
             let told = refused(&folder, &["check", scene]);
-            assert!(told.contains(&format!("is {found}; allowed: an ordinary file")), "{scene}: {told}");
+            assert!(told.contains(&format!("is {found}; allowed: a regular file")), "{scene}: {told}");
         }
         assert_eq!(folder.run(&["check", "svg.toml"]).code, Some(3));
     }
@@ -117,7 +117,7 @@ fn a_root_confines_all_that_a_scene_names() {
     folder.succeed(&["check", "job/other.toml", "--asset-root", "."]);
     for command in [&["check"][..], &["render", "--frames", "0", "--out", "a.png"]] {
         let told = refused(&folder, &[command, &["job/other.toml", "--asset-root", "job"]].concat());
-        assert!(told.contains("lies outside job, the folder that this scene is confined to"), "{told}");
+        assert!(told.contains("lies outside job, the asset root of this scene"), "{told}");
     }
     let run = folder.run(&["check", "job/own.toml", "--asset-root", "gone"]);
     assert_eq!(run.code, Some(2), "{}", run.stderr);
@@ -150,7 +150,7 @@ fn a_depth_that_hides_nothing_is_told_and_negative_z_hides_as_the_distance_does(
     assert!(told.contains("the depth is negative, as z of a camera that looks toward -z"), "{told}");
     assert!(distance == negative, "the same picture");
     let (open, told) = picture("zero", float_map(left(0.0, 0.0)));
-    assert!(told.contains("hides nothing, since none of its 3072 values is a depth: all are 0"), "{told}");
+    assert!(told.contains("hides nothing, since none of its 3072 values is a valid depth: all are 0"), "{told}");
     assert!(open != distance, "the left half of the flame is hidden");
     for (value, words) in
         [(f32::NAN, "all are not a number"), (f32::INFINITY, "all are infinite"), (1e30, "farther than")]

@@ -218,7 +218,7 @@ fn files_say_what_their_alpha_is_made_for_and_resuming_heeds_it() {
     assert!(says("f.png", b"bansho:alpha\0linear"));
     let refused = folder.run(&["render", "scene.toml", "--view", "raw", "--alpha", "encoded"]);
     assert_eq!(refused.code, Some(2));
-    assert!(refused.stderr.contains("--alpha: the view `raw` encodes nothing"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("--alpha: the view `raw` applies no encoding"), "{}", refused.stderr);
     folder.succeed(&["render", "over_black.toml", "--frames", "3", "-o", "plate.png"]);
     assert!(!says("plate.png", b"bansho:alpha"));
 }

@@ -34,7 +34,7 @@ fn the_farm_replaces_neither_links_nor_files_of_others() {
             fs::remove_file(&path).unwrap();
         }
         fs::write(&path, "somebody's own work").unwrap();
-        refused(&folder, &plan, "is there already and was not made by Bansho");
+        refused(&folder, &plan, "already exists and was not made by Bansho");
         fs::remove_file(&path).unwrap();
     }
     folder.succeed(&plan);
@@ -68,7 +68,7 @@ fn templates_and_tokens_of_templates_replace_nothing_else() {
     refused(&folder, &template, "shot.yaml: is a file that the scene is read from");
     fs::remove_file(folder.path("shot.yaml")).unwrap();
     folder.write("shot.yaml", "specificationVersion: jobtemplate-2023-09\n");
-    refused(&folder, &template, "shot.yaml: is there already and was not made by Bansho");
+    refused(&folder, &template, "shot.yaml: already exists and was not made by Bansho");
     fs::remove_file(folder.path("shot.yaml")).unwrap();
     folder.succeed(&template);
     folder.succeed(&template);
@@ -101,7 +101,7 @@ fn manual_pages_replace_only_manual_pages() {
     ] {
         fs::remove_file(folder.path("pages/bansho-render.1")).unwrap();
         make(&folder);
-        refused(&folder, &man, "pages/bansho-render.1: is there already and was not made by Bansho");
+        refused(&folder, &man, "pages/bansho-render.1: already exists and was not made by Bansho");
     }
 }
 
@@ -136,7 +136,7 @@ fn what_only_looks_like_a_frame_number_is_told() {
         run.stderr
     );
     let run = folder.succeed(&["render", "scene.toml", "--frames", "1", "-o", "take####/a.png"]);
-    assert!(run.stderr.contains("the folder `take####` is called so"), "{}", run.stderr);
+    assert!(run.stderr.contains("placeholders in the folder `take####` are taken literally"), "{}", run.stderr);
     assert_eq!(folder.names(), ["scene.toml", "shot#12.png", "take####/a.png"]);
 }
 

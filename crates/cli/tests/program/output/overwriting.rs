@@ -121,9 +121,8 @@ fn keeps_what_is_not_ours(folder: &Folder, file: &str, arguments: &[&str]) {
     let before = folder.names();
     let run = folder.run(arguments);
     assert_eq!((run.code, run.errors()), (Some(2), 1), "{arguments:?}: {}", run.stderr);
-    let said = format!(
-        "error: {file}: exists already, without the mark of files that Bansho made; allowed: another name, or --overwrite"
-    );
+    let said =
+        format!("error: {file}: already exists and was not made by Bansho; allowed: another name, or --overwrite");
     assert!(run.stderr.contains(&said), "{arguments:?}: {}", run.stderr);
     assert_eq!(folder.names(), before, "nothing else may be written");
     assert_eq!(fs::read(folder.path(file)).unwrap(), b"somebody's work");
@@ -168,7 +167,11 @@ fn the_first_of_many_files_is_named_and_the_others_are_counted() {
     for resume in [&[][..], &["--resume"]] {
         let run = folder.run(&[&["render", "scene.toml", "--out", "f.png"], resume].concat());
         assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
-        assert!(run.stderr.contains("error: f.0001.png and 2 other files: exist already"), "{}", run.stderr);
+        assert!(
+            run.stderr.contains("error: f.0001.png and 2 other files: already exist and were not made by Bansho"),
+            "{}",
+            run.stderr
+        );
         assert!(folder.files("") == before);
     }
 }
@@ -183,7 +186,7 @@ fn a_snapshot_that_bansho_did_not_make_is_only_replaced_when_asked_to() {
     ] {
         let run = folder.run(arguments);
         assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
-        assert!(run.stderr.contains("error: states/state.2.bansho: exists already"), "{}", run.stderr);
+        assert!(run.stderr.contains("error: states/state.2.bansho: already exists"), "{}", run.stderr);
         assert_eq!(folder.names(), ["scene.toml", "states/state.2.bansho"]);
     }
     let render = ["render", "scene.toml", "--out", "f/f.png", "--snapshots", "states"];
@@ -215,7 +218,7 @@ fn what_comes_on_the_way_and_is_not_ours_stays() {
     fs::write(folder.path("f/f.0399.png"), "a photograph").unwrap();
     let run = crate::support::Run::of(child.wait_with_output().unwrap());
     assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
-    let said = "f.0399.png: is there already and was not made by Bansho; allowed: another name, or --overwrite";
+    let said = "f.0399.png: already exists and was not made by Bansho; allowed: another name, or --overwrite";
     assert!(run.stderr.contains(said), "{}", run.stderr);
     assert_eq!(fs::read(folder.path("f/f.0399.png")).unwrap(), b"a photograph");
     assert!(folder.path("f/f.0100.png").exists() && !has_parts(&folder.path("f")));

@@ -133,7 +133,7 @@ fn a_depth_of_another_size_than_its_plate_is_resampled_and_told() {
     );
     for command in ["render laid.toml --frames 0 --out f.png", "check laid.toml"] {
         let run = folder.succeed(&command.split(' ').collect::<Vec<_>>());
-        let told = "laid.toml:5:1: plate: `depth` has 96 x 54 pixels, the image 64 x 36: each pixel of the picture takes the nearest of its values";
+        let told = "laid.toml:5:1: plate: `depth` has 96 x 54 pixels and the image 64 x 36: the nearest depth value is used for each pixel";
         assert!(run.stderr.contains(told), "{}", run.stderr);
     }
 }

@@ -191,7 +191,7 @@ fn nonsense_is_refused_and_nothing_is_written() {
         (&["--cube-size", "-1"], "--cube-size: a cube of -1 m; allowed: 0.001 to 100 m"),
         (&["--cube-size", "100"], "choose a smaller cube"),
         (&["--variants", "0"], "--variants: 0 variants; allowed: 1 to 1000"),
-        (&["--light-direction", "0,0,0"], "--light-direction: the vector toward the light has no length"),
+        (&["--light-direction", "0,0,0"], "--light-direction: the light direction is the zero vector"),
         (&["--light-direction", "up"], "three numbers"),
         (&["--opacity", "papers"], "exposure_fraction, paper"),
         (
@@ -202,7 +202,7 @@ fn nonsense_is_refused_and_nothing_is_written() {
             &["--oscillation", "nan", "--light-direction", "0,0,1"],
             "--oscillation: an oscillation of NaN; allowed: 0 to 1",
         ),
-        (&["--oscillation", "0.5"], "--oscillation: an oscillation changes the brightness of drops in a light"),
+        (&["--oscillation", "0.5"], "--oscillation: oscillation changes only lit textures"),
         (
             &["--oscillation", "0.5", "--opacity", "paper", "--light-direction", "0,0,1"],
             "--oscillation: the paper's streaks are lines of even brightness",

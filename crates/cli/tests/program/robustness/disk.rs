@@ -63,7 +63,7 @@ fn a_folder_that_may_not_be_written_is_an_error_before_anything_is_drawn() {
     let folder = Folder::with_scene(FLAME);
     let run = run_as_a_user(&folder);
     assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
-    assert!(run.stderr.contains("not allowed to write there"), "{}", run.stderr);
+    assert!(run.stderr.contains("no permission to write there"), "{}", run.stderr);
     assert!(folder.files("locked").is_empty() && !folder.path("locked/deep").exists());
 }
 

@@ -91,13 +91,13 @@ pub enum StreakTextureError {
         value: f64,
     },
     /// The diameters of a bin do not ascend.
-    #[error("a bin of diameters from {} to {} mm; allowed: ends that ascend", .range_mm[0], .range_mm[1])]
+    #[error("a bin of diameters from {} to {} mm; allowed: ascending limits", .range_mm[0], .range_mm[1])]
     BinRange {
         /// Its ends, mm.
         range_mm: [f64; 2],
     },
     /// A texture that is drawn over has another size than the cube.
-    #[error("a texture of {width} x {height} pixels; allowed: {size} x {size}, as the cube says")]
+    #[error("a texture of {width} x {height} pixels; allowed: {size} x {size}, as set for the cube")]
     ImageSize {
         /// Columns of the texture.
         width: usize,
@@ -107,6 +107,6 @@ pub enum StreakTextureError {
         size: usize,
     },
     /// The vector toward the light has no direction.
-    #[error("the vector toward the light has no length; allowed: three numbers that are not all 0")]
+    #[error("the light direction is the zero vector; allowed: a vector with at least one nonzero component")]
     LightDirection,
 }

@@ -19,7 +19,7 @@ pub enum EditError {
     Syntax(String),
     /// The assignment has no `=`, no valid path before it, or no value after it.
     #[error(
-        "`{0}` is no assignment; allowed: key.path=value, such as picture.size=[640,360] or flame_sheet.0.height=2"
+        "`{0}` is not an assignment; allowed: key.path=value, such as picture.size=[640,360] or flame_sheet.0.height=2"
     )]
     InvalidAssignment(String),
     /// The path does not exist in the scene.

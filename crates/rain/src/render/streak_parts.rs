@@ -22,7 +22,7 @@ const MAX_ZOOM: f64 = 0.1;
 const MAX_PARTS: usize = 16;
 
 /// The views of the parts of an exposure; the view itself if it is short and its camera hardly moves.
-pub(super) fn exposure_parts(view: &View) -> Vec<View> {
+pub(super) fn streak_parts(view: &View) -> Vec<View> {
     let Shutter { open, close } = view.shutter;
     let count = part_count(view);
     if count == 1 {
@@ -77,7 +77,7 @@ mod tests {
             ..CameraParameters::default()
         };
         let view = View::new(camera, Shutter { open: 0.0, close: exposure }, 0.1, [64, 36], 0);
-        let parts = exposure_parts(&view);
+        let parts = streak_parts(&view);
         for pair in parts.windows(2) {
             assert!((pair[0].shutter.close - pair[1].shutter.open).abs() < 1e-12);
         }

@@ -5,15 +5,13 @@ use bansho_base::math::{
     simd::{LANES, Real},
 };
 
-use crate::{
-    drops::{
-        cell::{CellState, DropStates},
-        classes::DropClassState,
-        lattice::LatticeCell,
-        shutter_state::ShutterState,
-    },
-    lanes::{LaneArray, Vec3Lanes, ZERO_LANES},
+use super::{
+    cell_motion::{CellState, DropStates},
+    classes::DropClassState,
+    lattice::LatticeCell,
+    shutter_state::ShutterState,
 };
+use crate::lanes::{LaneArray, Vec3Lanes, ZERO_LANES};
 
 const COUNT: Purpose = Purpose::named("rain drops of a cell");
 const DROP: Purpose = Purpose::named("rain drop");
