@@ -246,6 +246,24 @@ const PHENOMENA: &[Phenomenon] = &[
         cameras: ALL_CAMERAS,
     },
     Phenomenon {
+        name: "rain in the light of the sky",
+        shutter_s: USUAL_S,
+        tables: |_| "[sky]\nluminance = 50\nvisible = false\n[[rain]]\nrate_mm_per_h = 50\n".to_owned(),
+        carried: None,
+        cameras: &[CameraMotion::Still, CameraMotion::Pan, CameraMotion::Roll],
+    },
+    Phenomenon {
+        name: "rain near a lamp, drop by drop",
+        shutter_s: USUAL_S,
+        tables: |_| {
+            "[[light]]\nposition = [1.5, 3, 2]\nintensity = 900\n\
+             [[rain]]\nrate_mm_per_h = 50\nmethod = \"drops\"\n"
+                .to_owned()
+        },
+        carried: None,
+        cameras: &[CameraMotion::Still, CameraMotion::Roll],
+    },
+    Phenomenon {
         name: "sky with trees",
         shutter_s: USUAL_S,
         tables: |_| "[sky]\nluminance = 50\ntrees_deg = 8\n".to_owned(),
@@ -427,6 +445,11 @@ fn long_exposures_of_lakes_are_the_mean_of_short_ones() {
 #[test]
 fn long_exposures_of_obstacles_are_the_mean_of_short_ones() {
     check(&["obstacle", "flame before an obstacle"]);
+}
+
+#[test]
+fn long_exposures_of_rain_are_the_mean_of_short_ones() {
+    check(&["rain"]);
 }
 
 #[test]

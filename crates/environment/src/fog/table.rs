@@ -1,24 +1,13 @@
-//! The table `[fog]` and its parameters.
+//! The table `[fog]`.
 
 use std::sync::Arc;
 
 use bansho_base::{
-    parameters::{Range, animated::Animated},
     phenomenon::Phenomenon,
     tables::{BuildContext, BuiltTable, SharedRole, SharedTable, TableCount, TableKind},
 };
 
-use super::{Fog, scattering};
-
-bansho_base::parameters! {
-    /// Fog, everywhere above the ground: it dims what is far, and is lit by the sky, lamps and fires. Over a plate it needs the plate's depth, since a plate
-    /// without depth is infinitely far away.
-    pub struct FogParameters {
-        /// Meteorological visibility: the distance at which a black object has 2 % contrast against the horizon. Below 1000 it is called fog, 1000 to 5000 mist,
-        /// above haze.
-        visibility_m: Animated<f64> = Animated::from(500.0), limits(Range::new(1.0, 1e6)), unit("m");
-    }
-}
+use super::{Fog, FogParameters, scattering};
 
 impl FogParameters {
     /// The table `[fog]`. It is drawn before all other shared tables: within a slice, it is in front of their surfaces.

@@ -17,7 +17,7 @@ use super::{
     accumulate::Accumulator,
     background::{Background, BentPixels},
     hiding::{HidingDepth, HidingRows},
-    moments::{MomentScratch, Moments},
+    moving_members::{MomentScratch, Moments},
     plate::PlateFrame,
     slices::Slice,
 };

@@ -8,6 +8,7 @@ pub(crate) mod hiding;
 pub(crate) mod light_frame;
 pub(crate) mod mirror;
 pub(crate) mod moments;
+pub(crate) mod moving_members;
 pub(crate) mod plate;
 pub(crate) mod plate_cache;
 mod plate_light;

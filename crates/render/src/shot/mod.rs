@@ -31,7 +31,7 @@ use crate::{
     composite::{
         composition::{self, StripScratches},
         mirror::Mirror,
-        moments::{Moments, MovingMember},
+        moving_members::{Moments, MovingMember},
         plate_cache::PlateCache,
         slices::{self, Slice},
     },
