@@ -53,7 +53,7 @@ const EXCERPT_LENGTHS: [usize; 2] = [2000, 1000];
 /// ```
 /// use bansho_base::host::printable::printable_excerpt;
 /// let shown = printable_excerpt(&format!("unknown value `{}`; allowed: fire", "a".repeat(1_000_000))).into_owned();
-/// assert!(shown.starts_with("`aaa") && shown.contains("aaa [...] aaa") && shown.ends_with("allowed: fire") && shown.len() < 3100);
+/// assert!(shown.starts_with("unknown value `aaa") && shown.contains("aaa [...] aaa") && shown.ends_with("allowed: fire") && shown.len() < 3100);
 /// ```
 pub fn printable_excerpt(text: &str) -> Cow<'_, str> {
     let [first, last] = EXCERPT_LENGTHS;

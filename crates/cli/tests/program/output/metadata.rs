@@ -43,7 +43,7 @@ fn films_and_sheets_have_no_metadata() {
     for arguments in [&["--out", "f.gif"][..], &["--contact-sheet", "4"]] {
         let run = folder.run(&[&["render", "scene.toml", "--metadata"], arguments].concat());
         assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
-        assert!(run.stderr.contains("--metadata") && run.stderr.contains("allowed: .png, .exr"), "{}", run.stderr);
+        assert!(run.stderr.contains("--metadata") && run.stderr.contains("allowed: .png or .exr"), "{}", run.stderr);
         assert_eq!(folder.names(), ["scene.toml"]);
     }
 }

@@ -372,7 +372,7 @@ mod tests {
         let passes: Vec<String> = ["AO", "Emit"].into_iter().flat_map(rgb).collect();
         let header = file(vec![part(None, &passes.iter().map(String::as_str).collect::<Vec<_>>())]);
         let error = chosen(&header, &PictureLayers::default()).unwrap_err().to_string();
-        assert!(error.contains("it has AO, Emit; `image_layer` in [plate] chooses one"), "{error}");
+        assert!(error.contains("it has AO, Emit; select one with `image_layer` in [plate]"), "{error}");
         let layers = PictureLayers { image: Some("Emit".to_owned()), depth: None };
         assert_eq!(chosen(&header, &layers).unwrap(), expected(["Emit.R", "", ""]));
         let layers = PictureLayers { image: Some("Diffuse".to_owned()), depth: None };
