@@ -276,6 +276,6 @@ mod tests {
         assert_eq!(counts.map(|parts| parts.count), [1, 1]);
         let mut counts = [PartCount { count: 8, blurs_itself: true }, PartCount { count: 5, blurs_itself: false }];
         nest(&mut counts);
-        assert_eq!(counts.map(|parts| parts.count), [6, 6]);
+        assert_eq!(counts.map(|parts| parts.count), [8, 4]);
     }
 }

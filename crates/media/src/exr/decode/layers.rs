@@ -385,7 +385,7 @@ mod tests {
         let layers = PictureLayers { image: Some("AO".to_owned()), depth: Some("Emit.G".to_owned()) };
         assert_eq!(chosen(&header, &layers).unwrap(), expected(["AO.R", "", "Emit.G"]));
         let none = ChannelSelection::of_depth(&header, None).unwrap_err().to_string();
-        assert!(none.contains("`depth_layer` in [plate] chooses one"), "{none}");
+        assert!(none.contains("select one with `depth_layer` in [plate]"), "{none}");
     }
 
     #[test]
