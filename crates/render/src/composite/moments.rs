@@ -201,3 +201,14 @@ impl<'a> OpaqueSurfacesAre<'a> {
 fn hull<'a>(rects: impl Iterator<Item = &'a Rect>) -> Rect {
     rects.fold(Rect::default(), |all, rect| all.union(rect))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_of_a_piece_are_its_share_of_the_exposure() {
+        assert_eq!(moments_of(2, 8, 32), 8..12);
+        assert_eq!(moments_of(0, 1, 24), 0..24);
+    }
+}

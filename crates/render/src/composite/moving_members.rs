@@ -162,10 +162,4 @@ mod tests {
         let aligned = |cell: &Cell| cell.rect.x / TILE_COLUMNS == (cell.rect.right() - 1) / TILE_COLUMNS;
         assert!(cells.iter().filter(|cell| cell.is_drawn_by_moments()).all(aligned));
     }
-
-    #[test]
-    fn moments_of_a_piece_are_its_share_of_the_exposure() {
-        assert_eq!(moments_of(2, 8, 32), 8..12);
-        assert_eq!(moments_of(0, 1, 24), 0..24);
-    }
 }

@@ -96,7 +96,8 @@ fn a_plate_that_would_take_too_much_memory_is_refused_with_what_may_be_done() {
     folder.write("over.toml", &over("plate.png"));
     folder.succeed(&["check", "over.toml", "--max-asset-memory", "3MiB"]);
     let told = refused(&folder, &["check", "over.toml", "--max-asset-memory", "1MiB"]);
-    let parts = ["over.toml:16:9: plate.image: ", "would take 1.9 MiB of memory", "up to 1.0 MiB", "--max-asset-memory"];
+    let parts =
+        ["over.toml:16:9: plate.image: ", "would take 1.9 MiB of memory", "up to 1.0 MiB", "--max-asset-memory"];
     assert!(parts.iter().all(|part| told.contains(part)), "{told}");
     let run = folder.run(&["check", "over.toml", "--max-asset-memory", "1"]);
     assert_eq!(run.code, Some(2));
