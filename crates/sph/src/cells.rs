@@ -124,12 +124,7 @@ impl<const D: usize> Cells<D> {
         let mut sorted = std::mem::replace(&mut self.positions, [const { Vec::new() }; D]);
         sorted.par_iter_mut().zip(positions).for_each(|(to, from)| {
             to.clear();
-            to.reserve(self.order.len() + 2 * BATCH);
-            for index in &self.order {
-                let position = from[*index as usize];
-                // Also for NaN.
-                to.push(if position.abs() < OUT_OF_RANGE { position } else { OUT_OF_RANGE });
-            }
+            to.extend(self.order.iter().map(|index| limit_to_range(from[*index as usize])));
             to.resize((ids.len() + BATCH).next_multiple_of(BATCH), -OUT_OF_RANGE);
         });
         self.positions = sorted;
@@ -221,6 +216,11 @@ impl<const D: usize> Cells<D> {
     pub(super) fn batches(&self) -> &[GroupBatch] {
         &self.batches
     }
+}
+
+/// A coordinate, or [`OUT_OF_RANGE`] in place of NaN and of one that is farther away.
+fn limit_to_range(x: f32) -> f32 {
+    if x.abs() < OUT_OF_RANGE { x } else { OUT_OF_RANGE }
 }
 
 /// Cell coordinates of one component, `scale` cells per unit; returns the minimum and the maximum. `floor` is avoided: without
