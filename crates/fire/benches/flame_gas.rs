@@ -106,9 +106,12 @@ fn naive<const WIDTH: usize>(
         let Some(projected) = view.camera.project(position) else { continue };
         let radius = f64::from(particles.support_radii()[index]);
         let reach = radius * projected.pixels_per_meter;
-        let clip = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-        for y in clip(projected.pixel.y - reach, SIZE[1])..clip(projected.pixel.y + reach + 1.0, SIZE[1]) {
-            for x in clip(projected.pixel.x - reach, SIZE[0])..clip(projected.pixel.x + reach + 1.0, SIZE[0]) {
+        let [left, right] =
+            [-reach, reach + 1.0].map(|side| (projected.pixel.x + side).clamp(0.0, SIZE[0] as f64) as usize);
+        let [top, bottom] =
+            [-reach, reach + 1.0].map(|side| (projected.pixel.y + side).clamp(0.0, SIZE[1] as f64) as usize);
+        for y in top..bottom {
+            for x in left..right {
                 let offset = [x as f64 + 0.5 - projected.pixel.x, y as f64 + 0.5 - projected.pixel.y];
                 let offset = offset.map(|pixels| pixels / projected.pixels_per_meter);
                 let sums = &mut picture[y * SIZE[0] + x];
@@ -119,13 +122,17 @@ fn naive<const WIDTH: usize>(
     black_box(picture);
 }
 
+/// Volume of the gas of a particle, m^3.
+fn volume(particles: &GasParticles, index: usize) -> f64 {
+    f64::from(particles.masses()[index] / particles.densities()[index])
+}
+
 fn gas_720p(criterion: &mut Criterion) {
     let pool = pinned_pool(2);
     let subject =
         Subject { particles: plume::plume(COUNT, HEIGHT, TIME), view: view(), buffers: BufferPool::default() };
     let Subject { particles, view, .. } = &subject;
     let rendering = GasRenderingParameters::default();
-    let volume = |index: usize| f64::from(particles.masses()[index] / particles.densities()[index]);
     let mut group = criterion.benchmark_group("flame gas 1280x720");
     group.sample_size(10);
     group.bench_function("sums and detail", |bencher| {
@@ -144,7 +151,7 @@ fn gas_720p(criterion: &mut Criterion) {
         bencher.iter(|| {
             naive(particles, view, |index, [u, v], radius| {
                 let tau = line_integral(math::hypot(u, v), radius)
-                    * volume(index)
+                    * volume(particles, index)
                     * soot_absorption(f64::from(particles.soot_fractions()[index]), &rendering);
                 let [red, green, blue] = color::black_body().radiance(particles.temperatures()[index]).map(f64::from);
                 [tau, tau * red, tau * green, tau * blue]
@@ -166,7 +173,7 @@ fn gas_720p(criterion: &mut Criterion) {
         bencher.iter(|| {
             naive(particles, view, |index, [u, v], radius| {
                 let b = math::hypot(u, v).max(1e-9);
-                let slope = line_gradient(b, radius) * volume(index) / b;
+                let slope = line_gradient(b, radius) * volume(particles, index) / b;
                 [slope * u, slope * v]
             });
         });

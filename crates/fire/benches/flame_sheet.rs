@@ -9,7 +9,7 @@ use bansho_base::{
     math,
     parameters::{Auto, animated::Animated},
     phenomenon::{
-        Run,
+        Prepared, Run,
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::Surroundings,
     },
@@ -40,22 +40,23 @@ fn draw_frame(sheet: &FlameSheet, view: &View, strips: &mut [Strip]) {
     let wind = Wind::new(WindParameters::default(), 1, None);
     let surroundings = Surroundings::from_wind(&wind);
     let Ok(prepared) = sheet.prepare(view, &surroundings, &Unobserved) else { return };
-    let threads = strips.len();
-    let draw = |thread: usize, strip: &mut Strip| {
-        for y in (thread * STRIP..SIZE[1]).step_by(threads * STRIP) {
-            strip.reset(Rect { x: 0, y, width: SIZE[0], height: STRIP.min(SIZE[1] - y) }, None, 0);
-            prepared.draw(&DepthInterval::ALL, strip);
-            black_box(&strip.radiance);
-        }
-    };
+    let (prepared, threads) = (prepared.as_ref(), strips.len());
     std::thread::scope(|scope| {
         let Some((own, others)) = strips.split_first_mut() else { return };
         for (index, strip) in others.iter_mut().enumerate() {
-            let draw = &draw;
-            scope.spawn(move || draw(index + 1, strip));
+            scope.spawn(move || draw_every_nth_strip(prepared, index + 1, threads, strip));
         }
-        draw(0, own);
+        draw_every_nth_strip(prepared, 0, threads, own);
     });
+}
+
+/// Draws strip `first` of the picture and every `step`-th one after it.
+fn draw_every_nth_strip(prepared: &dyn Prepared, first: usize, step: usize, strip: &mut Strip) {
+    for y in (first * STRIP..SIZE[1]).step_by(step * STRIP) {
+        strip.reset(Rect { x: 0, y, width: SIZE[0], height: STRIP.min(SIZE[1] - y) }, None, 0);
+        prepared.draw(&DepthInterval::ALL, strip);
+        black_box(&strip.radiance);
+    }
 }
 
 /// All equations with trigonometric functions and curves evaluated at every pixel.

@@ -31,11 +31,11 @@ impl<const D: usize> Keys<D> {
         Self { lower, shift, bits }
     }
 
-    /// The key of a cell.
-    pub(super) fn key(&self, cell: [i32; D]) -> u64 {
+    /// The key of the cell of the particle at an index; `coordinates` are the cells of all particles, one array per axis.
+    pub(super) fn key(&self, coordinates: &[Vec<i32>; D], index: usize) -> u64 {
         let mut key = 0;
         for c in 0..D {
-            key |= ((cell[c] - self.lower[c]) as u64) << self.shift[c];
+            key |= ((coordinates[c][index] - self.lower[c]) as u64) << self.shift[c];
         }
         key
     }
@@ -75,11 +75,12 @@ pub(super) struct CellRows<'a, const D: usize> {
 impl<'a, const D: usize> CellRows<'a, D> {
     /// The ranges of neighbor candidates of row chunks, from `first` on.
     pub(super) fn neighbor_runs(&self, first: &RowChunk) -> NeighborRuns<'a> {
-        let row = |key_offset: u64| {
-            let start = self.occupied.partition_point(|cell| cell.key < first.min_key(key_offset));
-            NeighborRow { key_offset, start, end: 0 }
-        };
-        let rows: Vec<NeighborRow> = self.keys.rows().map(row).collect();
+        let mut rows = Vec::new();
+        for key_offset in self.keys.rows() {
+            let min_key = first.min_key(key_offset);
+            let start = self.occupied.partition_point(|cell| cell.key < min_key);
+            rows.push(NeighborRow { key_offset, start, end: 0 });
+        }
         NeighborRuns { occupied: self.occupied, runs: vec![0..0; rows.len()], rows }
     }
 }

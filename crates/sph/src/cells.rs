@@ -58,20 +58,18 @@ impl<const D: usize> Cells<D> {
     #[must_use]
     pub fn new(support_radius: f32) -> Self {
         const { assert!(D == 2 || D == 3, "particles have two or three dimensions") };
-        let empty = || std::array::from_fn(|_| Vec::new());
         let keys = Keys::new([0; D], [0; D]);
         let (order, ids, occupied, row_chunks, batches) = Default::default();
-        let coordinates = std::array::from_fn(|_| Vec::new());
         Self {
             support_radius,
             keys,
             order,
             ids,
-            positions: empty(),
+            positions: [const { Vec::new() }; D],
             occupied,
             row_chunks,
             batches,
-            coordinates,
+            coordinates: [const { Vec::new() }; D],
             sorting: SampleSort::default(),
             scratch: Vec::new(),
         }
@@ -123,11 +121,10 @@ impl<const D: usize> Cells<D> {
         if !ids.is_empty() {
             self.sort(ids, &bounds);
         }
-        let clamp_to_range = |x: f32| if x.abs() < OUT_OF_RANGE { x } else { OUT_OF_RANGE };
-        let mut sorted = std::mem::replace(&mut self.positions, std::array::from_fn(|_| Vec::new()));
+        let mut sorted = std::mem::replace(&mut self.positions, [const { Vec::new() }; D]);
         sorted.par_iter_mut().zip(positions).for_each(|(to, from)| {
             to.clear();
-            to.extend(self.order.iter().map(|i| clamp_to_range(from[*i as usize])));
+            to.extend(self.order.iter().map(|index| limit_to_range(from[*index as usize])));
             to.resize((ids.len() + BATCH).next_multiple_of(BATCH), -OUT_OF_RANGE);
         });
         self.positions = sorted;
@@ -148,14 +145,7 @@ impl<const D: usize> Cells<D> {
     fn sort(&mut self, ids: &[u64], bounds: &[[i32; 2]; D]) {
         let Self { coordinates, sorting, order, occupied, .. } = self;
         let keys = Keys::new(bounds.map(|[first, _]| first), bounds.map(|[_, last]| last));
-        let key = |index: usize| {
-            let mut cell = [0; D];
-            for c in 0..D {
-                cell[c] = coordinates[c][index];
-            }
-            keys.key(cell)
-        };
-        sorting.sort(key, keys.bits, ids, order, occupied);
+        sorting.sort(|index| keys.key(coordinates, index), keys.bits, ids, order, occupied);
         occupied.resize(occupied.len() + SEARCH_WIDTH, Cell { key: u64::MAX, start: ids.len() as u32 });
         self.keys = keys;
     }
@@ -226,6 +216,11 @@ impl<const D: usize> Cells<D> {
     pub(super) fn batches(&self) -> &[GroupBatch] {
         &self.batches
     }
+}
+
+/// A coordinate, or [`OUT_OF_RANGE`] in place of NaN and of one that is farther away.
+fn limit_to_range(x: f32) -> f32 {
+    if x.abs() < OUT_OF_RANGE { x } else { OUT_OF_RANGE }
 }
 
 /// Cell coordinates of one component, `scale` cells per unit; returns the minimum and the maximum. `floor` is avoided: without

@@ -104,12 +104,11 @@ impl PressureForce {
         accelerations: &mut [Vec<f32>; D],
     ) {
         assert!(masses.len() == densities.len() && densities.len() == pressures.len(), "one value per particle");
-        let volume = |(mass, density): (&f32, &f32)| mass / density;
         masses
             .par_iter()
             .zip(densities)
             .with_min_len(MIN_PARTICLES_PER_TASK)
-            .map(volume)
+            .map(|(mass, density)| mass / density)
             .collect_into_vec(&mut self.volume);
         let fields = [pressures, self.volume.as_slice()];
         let results = accelerations.each_mut();
@@ -134,8 +133,12 @@ impl PressureForce {
 /// If there is not one mass and density per particle.
 pub fn mixing_weights(masses: &[f32], densities: &[f32], weights: &mut Vec<f32>) {
     assert_eq!(masses.len(), densities.len(), "one mass and density per particle");
-    let weight = |(mass, density): (&f32, &f32)| mass / density.sqrt();
-    masses.par_iter().zip(densities).with_min_len(MIN_PARTICLES_PER_TASK).map(weight).collect_into_vec(weights);
+    masses
+        .par_iter()
+        .zip(densities)
+        .with_min_len(MIN_PARTICLES_PER_TASK)
+        .map(|(mass, density)| mass / density.sqrt())
+        .collect_into_vec(weights);
 }
 
 /// Courant number, relative to the time in which sound and the fastest particle cross half the support radius.

@@ -34,8 +34,11 @@ pub(super) struct Group {
 impl GroupBatch {
     /// The particles of all groups.
     pub(super) fn particles(&self) -> Range<usize> {
-        let at = |group: Option<&Group>, edge: fn(&Group) -> usize| group.map_or(0, edge);
-        at(self.groups.first(), |group| group.particles.start)..at(self.groups.last(), |group| group.particles.end)
+        match self.groups.as_slice() {
+            [] => 0..0,
+            [group] => group.particles.clone(),
+            [first, .., last] => first.particles.start..last.particles.end,
+        }
     }
 }
 

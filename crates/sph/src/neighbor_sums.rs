@@ -85,14 +85,15 @@ impl<const D: usize> Cells<D> {
 
 /// The slice of each array that belongs to each batch of groups.
 fn split<'a, const OUT: usize>(batches: &[GroupBatch], mut arrays: [&'a mut [f32]; OUT]) -> Vec<[&'a mut [f32]; OUT]> {
-    let mut slice_of = |batch: &GroupBatch| {
-        arrays.each_mut().map(|values| {
-            let (head, tail) = std::mem::take(values).split_at_mut(batch.particles().len());
-            *values = tail;
+    let mut slices = Vec::with_capacity(batches.len());
+    for batch in batches {
+        slices.push(arrays.each_mut().map(|rest| {
+            let (head, tail) = std::mem::take(rest).split_at_mut(batch.particles().len());
+            *rest = tail;
             head
-        })
-    };
-    batches.iter().map(&mut slice_of).collect()
+        }));
+    }
+    slices
 }
 
 /// Inputs of a sum: positions and fields in sorted order.

@@ -27,8 +27,12 @@ pub struct Particles<const D: usize> {
 
 impl<const D: usize> Default for Particles<D> {
     fn default() -> Self {
-        let none = || std::array::from_fn(|_| Vec::new());
-        Self { positions: none(), velocities: none(), masses: Vec::new(), ids: Vec::new() }
+        Self {
+            positions: [const { Vec::new() }; D],
+            velocities: [const { Vec::new() }; D],
+            masses: Vec::new(),
+            ids: Vec::new(),
+        }
     }
 }
 

@@ -83,8 +83,11 @@ impl SampleSort {
         let step = (self.entries.len() / (count * SAMPLES)).max(1);
         self.sample.extend(self.entries.iter().step_by(step).map(|entry| entry.key));
         self.sample.sort_unstable();
-        let start = |number: usize| if number == 0 { 0 } else { self.sample[number * self.sample.len() / count] };
-        (0..count).map(start).collect()
+        let mut starts = vec![0; count];
+        for (number, start) in starts.iter_mut().enumerate().skip(1) {
+            *start = self.sample[number * self.sample.len() / count];
+        }
+        starts
     }
 }
 
@@ -93,8 +96,9 @@ impl KeyRange {
     fn take(&mut self, all: &[Entry], start: u64, end: Option<u64>) {
         self.entries.clear();
         let last = end.map_or(u64::MAX, |end| end.wrapping_sub(1));
-        let is_in_range = |entry: &&Entry| start <= entry.key && entry.key <= last && end != Some(start);
-        self.entries.extend(all.iter().filter(is_in_range));
+        if end != Some(start) {
+            self.entries.extend(all.iter().filter(|entry| start <= entry.key && entry.key <= last));
+        }
     }
 
     /// Sorts them by key, then by id.
@@ -127,14 +131,15 @@ impl KeyRange {
 fn radix_pass(from: &[Entry], to: &mut [Entry], bits: Range<u32>) {
     let mut offsets = [0_u32; 1 << DIGIT_BITS];
     let mask = (1 << bits.len()) - 1;
-    let digit = |key: u64| (key >> bits.start) as usize & mask;
-    from.iter().for_each(|entry| offsets[digit(entry.key)] += 1);
+    for entry in from {
+        offsets[(entry.key >> bits.start) as usize & mask] += 1;
+    }
     let mut sum = 0;
     for offset in &mut offsets[..=mask] {
         sum += std::mem::replace(offset, sum);
     }
     for entry in from {
-        let offset = &mut offsets[digit(entry.key)];
+        let offset = &mut offsets[(entry.key >> bits.start) as usize & mask];
         to[*offset as usize] = *entry;
         *offset += 1;
     }

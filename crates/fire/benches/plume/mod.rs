@@ -29,10 +29,11 @@ fn particle(id: u64, age: f64, t: f64, height: f64, volume: f64) -> Particle {
     let speed = height * (0.35 + 1.3 * age_fraction) / LIFETIME_S;
     let (sin, cos) = math::sin_cos(std::f64::consts::TAU * u);
     let radius = 0.16 * height * math::sqrt(v) * (1.0 - 0.55 * age_fraction);
-    let sway = |phase: f64| {
-        0.10 * height * age_fraction * math::sin(std::f64::consts::TAU * (1.4 * (t - age) + 1.3 * y / height) + phase)
-    };
-    let position = [radius * cos + sway(0.0 + 2.0 * u), y, radius * sin + sway(1.7 + 2.0 * v)];
+    // Particles sway with random phases, the more the older they are.
+    let (amplitude, turn) =
+        (0.10 * height * age_fraction, std::f64::consts::TAU * (1.4 * (t - age) + 1.3 * y / height));
+    let [across, toward] = [2.0 * u, 1.7 + 2.0 * v].map(|phase| amplitude * math::sin(turn + phase));
+    let position = [radius * cos + across, y, radius * sin + toward];
     let hot = math::smoothstep(0.0, 0.15, age_fraction) * (1.0 - 0.35 * math::smoothstep(0.4, 1.0, age_fraction));
     let edge = math::sqrt(v) * 0.15;
     let soot = 1.5e-6

@@ -3,10 +3,10 @@
 /// A thread pool with each thread pinned to its own core: unpinned threads are often scheduled on the same core.
 pub(crate) fn pinned_pool(threads: usize) -> rayon::ThreadPool {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let pin = move |index: usize| {
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(move |index| {
         if let Some(core) = cores.get(index) {
             core_affinity::set_for_current(*core);
         }
-    };
-    rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(pin).build().expect("a pool")
+    });
+    builder.build().expect("a pool")
 }

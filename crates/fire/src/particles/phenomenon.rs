@@ -40,14 +40,17 @@ impl FlameParticlesParameters {
 
     /// Moves the burners, so that the first is at `position`. Gas that burns already stays where it is.
     fn move_burners(&mut self, position: DVec3) {
-        let last =
-            |burner: &BurnerParameters| burner.position.values().last().map_or(DVec3::ZERO, |last| DVec3::from(*last));
-        let first = self.burners.first().map_or(DVec3::ZERO, last);
+        let first = self.burners.first().map_or(DVec3::ZERO, last_position);
         let displacement = position - DVec3::from(self.position) - first;
         for burner in &mut self.burners {
-            burner.position = (last(burner) + displacement).to_array().into();
+            burner.position = (last_position(burner) + displacement).to_array().into();
         }
     }
+}
+
+/// Where a burner stays after it has moved, relative to the flame, m.
+fn last_position(burner: &BurnerParameters) -> DVec3 {
+    burner.position.values().last().map_or(DVec3::ZERO, |last| DVec3::from(*last))
 }
 
 impl FlameParticlesParameters {
@@ -133,30 +136,31 @@ impl Phenomenon for FlameParticles {
 
     fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
         let burners = &self.constants.derived.burners;
-        let emits_gas = |burner: &Burner| burner.parameters.flow.bounds()[1] > 0.0;
-        if !burners.iter().any(emits_gas) {
+        if !burners.iter().any(Burner::emits_gas) {
             return Some(Remark::new("none of its burners emits gas; set a `flow` above 0"));
         }
         if let Some(key) = table_without_effect(self.parameters()) {
             return Some(Remark::at(key, format!("`{key}` sets something without effect; {EULER_KEYS}")));
         }
-        let origin = DVec3::from(self.parameters().position);
-        let is_inside_obstacle = |burner: &Burner| {
-            let is_inside = |id: u64| {
-                let position = origin + burner.spawn_point(self.constants.key, id, 0.0).position;
-                neighbors.occluders().any(|occluder| occluder.signed_distance(position) < 0.0)
-            };
-            // 32 random spawn points represent the whole surface of the burner.
-            emits_gas(burner) && (0..32).all(is_inside)
-        };
-        burners.iter().position(is_inside_obstacle).map(|index| {
-            let message = format!("its burner {} is inside an obstacle, so that its gas cannot escape", index + 1);
-            Remark::at(format!("burners.{index}"), message)
-        })
+        let index =
+            burners.iter().position(|burner| burner.emits_gas() && self.is_inside_obstacle(burner, neighbors))?;
+        let message = format!("its burner {} is inside an obstacle, so that its gas cannot escape", index + 1);
+        Some(Remark::at(format!("burners.{index}"), message))
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {
         Box::new(FlameParticlesRun::new(self))
+    }
+}
+
+impl FlameParticles {
+    /// Whether a burner lies inside obstacles at time 0, judged by 32 random spawn points, which represent its whole surface.
+    fn is_inside_obstacle(&self, burner: &Burner, neighbors: &OtherPhenomena) -> bool {
+        let origin = DVec3::from(self.parameters().position);
+        (0..32).all(|id| {
+            let position = origin + burner.spawn_point(self.constants.key, id, 0.0).position;
+            neighbors.occluders().any(|occluder| occluder.signed_distance(position) < 0.0)
+        })
     }
 }
 

@@ -102,14 +102,12 @@ impl FlameParticlesRun {
         if gases.is_empty() {
             gases.push(self.gas_at(shutter.middle()));
         }
-        let begin = |index: usize| match gases.get(index) {
-            Some(gas) if index > 0 => gas.time.max(shutter.open),
-            Some(_) => shutter.open,
-            None => shutter.close,
-        };
         let mut states = Vec::with_capacity(gases.len());
         for (index, gas) in gases.iter().enumerate() {
-            let part = Shutter { open: begin(index), close: begin(index + 1) };
+            // A state is exposed until the next one; the first stands for what precedes it, too.
+            let open = if index == 0 { shutter.open } else { gas.time.max(shutter.open) };
+            let close = gases.get(index + 1).map_or(shutter.close, |next| next.time.max(shutter.open));
+            let part = Shutter { open, close };
             if part.close > part.open || gases.len() == 1 {
                 states.push(GasState { gas: *gas, shutter: part });
             }

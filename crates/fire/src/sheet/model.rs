@@ -84,14 +84,13 @@ impl FlameSheet {
     pub(super) fn tables(&self) -> &Tables {
         let FlameSheetParameters { shape, texture, color, stage, .. } = &self.parameters;
         let has_soot_field = self.parameters.method == SheetMethod::SootField;
-        let compute = || {
+        let tables: &Arc<Tables> = get_or_compute(&self.tables, || {
             Arc::new(Tables {
                 shape: Box::new(ShapeTables::new(shape, texture, color)),
                 ramp: Box::new(ColorRamp::new(texture, color, *stage)),
                 soot_field: has_soot_field.then(|| Box::new(SootFieldTables::new(&self.parameters.soot_field, color))),
             })
-        };
-        let tables: &Arc<Tables> = get_or_compute(&self.tables, compute);
+        });
         tables
     }
 
@@ -218,16 +217,18 @@ fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Cloc
     } else {
         parameters.instances.clone()
     };
-    let flame = |(index, placement): (usize, InstanceParameters)| {
+    let mut flames = Vec::with_capacity(placements.len());
+    for (index, placement) in placements.into_iter().enumerate() {
         let key = instance_key(seed, name, parameters.variation, index);
         let texture_source = match (&paper, exact) {
             (Some(layer), _) => TextureSource::Paper(layer.clone()),
             (_, Some(sum)) => TextureSource::Exact(sum),
             _ => TextureSource::Fractal(FractalLayers::new(tongue_size(parameters), 1.0, key, clock)),
         };
-        FlameInstance { placement, key, waves: FlameWaves::new(&parameters.shape, key, clock), texture_source }
-    };
-    placements.into_iter().enumerate().map(flame).collect()
+        let waves = FlameWaves::new(&parameters.shape, key, clock);
+        flames.push(FlameInstance { placement, key, waves, texture_source });
+    }
+    flames
 }
 
 /// Width and length of the fractal's tongues relative to the default, in sheet widths and heights: their shape in meters does not depend on the aspect ratio

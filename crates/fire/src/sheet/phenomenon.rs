@@ -116,8 +116,8 @@ impl Phenomenon for FlameSheet {
     }
 
     fn shared_memory(&self, view: &View) -> Vec<SharedMemory> {
-        let key = |flame| Some((FILTERED_TABLES, self.shared_table_key(flame, view)?));
-        let filtered = self.flames.iter().filter_map(key).map(|key| SharedMemory { key, bytes: TABLE_BYTES });
+        let keys = self.flames.iter().filter_map(|flame| self.shared_table_key(flame, view));
+        let filtered = keys.map(|key| SharedMemory { key: (FILTERED_TABLES, key), bytes: TABLE_BYTES });
         // The table and its coarser levels.
         filtered.chain([SharedMemory { key: ("fractal table", 0), bytes: 2.0 * TABLE_BYTES }]).collect()
     }
@@ -168,8 +168,8 @@ impl FlameSheet {
         let middle = base + DVec3::Y * (0.5 * size.y);
         let seen = camera.project(middle)?;
         let margin = 0.5 * size.x.max(size.y) * seen.pixels_per_meter;
-        let is_inside = |at: f64, side: f64| (-margin..side + margin).contains(&at);
-        let is_seen = is_inside(seen.pixel.x, camera.size[0]) && is_inside(seen.pixel.y, camera.size[1]);
+        let is_seen = (-margin..camera.size[0] + margin).contains(&seen.pixel.x)
+            && (-margin..camera.size[1] + margin).contains(&seen.pixel.y);
         if self.is_out(t) || !is_seen {
             return None;
         }

@@ -208,18 +208,16 @@ impl SparkEmitter<'_> {
         let t = view.shutter.middle();
         let size = self.size;
         let origin = self.base + DVec3::new(spark.start.x * size.x, spark.start.y * size.y, spark.start.z * size.x);
-        let project_at = |at: f64| {
+        let glow = self.glow(spark, view.shutter);
+        let mut ends = [(DVec3::ZERO, 0.0, None); 2];
+        for (end, at) in ends.iter_mut().zip([glow.open, glow.close]) {
             let camera = view.camera_at(at);
             let age = (spark.age + at - t).clamp(0.0, spark.lifetime_s);
             let position = origin + self.displacement(spark, age) + self.drift(wind, origin, at, age);
-            Some((camera.project_beyond_circle(position)?, position, (position - camera.position).length_squared()))
-        };
-        let glow = self.glow(spark, view.shutter);
-        let (Some((opened, from, opened_square)), Some((closed, to, closed_square))) =
-            (project_at(glow.open), project_at(glow.close))
-        else {
-            return;
-        };
+            let distance_squared = (position - camera.position).length_squared();
+            *end = (position, distance_squared, camera.project_beyond_circle(position));
+        }
+        let [(from, opened_square, Some(opened)), (to, closed_square, Some(closed))] = ends else { return };
         let depth = 0.5 * (opened.depth + closed.depth);
         let sorting_depth = self.sheet.map_or(depth, |sheet| sheet.sorting_depth(0.5 * (from + to), depth));
         let is_whole = glow == view.shutter;

@@ -106,10 +106,10 @@ impl SpriteKind for MotionSprites<'_> {
 impl<'a> GasMotionField<'a> {
     pub(crate) fn new(gas: &Gas<'a>, rendering: &GasRenderingParameters, view: &GasView) -> Option<Self> {
         let sprites = project_particles(gas, view, &MotionSprites { gas, rendering });
-        let motions = |axis: usize| {
-            sprites.iter().flat_map(|task| task.iter()).map(move |sprite| sprite.values[1 + axis] / sprite.values[0])
-        };
-        let min_max = [0, 1].map(|axis| min_max(motions(axis)));
+        let min_max = [0, 1].map(|axis| {
+            let all_sprites = sprites.iter().flat_map(|task| task.iter());
+            min_max(all_sprites.map(|sprite| sprite.values[1 + axis] / sprite.values[0]))
+        });
         let grid = splat(
             &SplatSettings {
                 profile: Profile::LINE,
@@ -134,13 +134,17 @@ impl<'a> GasMotionField<'a> {
         let rows = [-1, 0, 1, 2].map(|k| &self.grid.row(row + k)[start..start + 12]);
         let mut columns = [0.0; 12];
         weighted_sum(&mut columns, rows, &self.weights[down]);
-        let plane = |plane: usize| (0..4).map(|k| columns[3 * k + plane] * self.weights[across][k]).sum::<f32>();
-        let weight = plane(0);
-        let mean = |axis: usize| {
-            let [min_value, max_value] = self.min_max[axis];
-            (plane(1 + axis) / weight).max(min_value).min(max_value)
-        };
-        if weight > 0.0 { [mean(0), mean(1)] } else { [0.0; 2] }
+        let [weight, right, below] =
+            [0, 1, 2].map(|plane| (0..4).map(|k| columns[3 * k + plane] * self.weights[across][k]).sum::<f32>());
+        if weight <= 0.0 || weight.is_nan() {
+            return [0.0; 2];
+        }
+        // Cubic splines overshoot: no pixel moves more than all particles do.
+        let mut motion = [right, below];
+        for (value, [min_value, max_value]) in motion.iter_mut().zip(self.min_max) {
+            *value = (*value / weight).max(min_value).min(max_value);
+        }
+        motion
     }
 }
 

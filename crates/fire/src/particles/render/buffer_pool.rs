@@ -41,12 +41,20 @@ impl BufferPool {
     /// than were in use at once.
     fn find_free<T: 'static>(&self, count: usize) -> Option<Vec<T>> {
         let mut free = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let capacity = |index: &usize| free[*index].capacity;
-        let of_type = || (0..free.len()).filter(|index| free[*index].list.is::<Vec<T>>());
-        let fits = of_type().filter(|index| capacity(index) >= count).min_by_key(capacity);
-        let chosen = fits.or_else(|| of_type().max_by_key(capacity))?;
-        let unused = free.swap_remove(chosen);
-        fits.and_then(|_| unused.list.downcast().ok().map(|list| *list))
+        let (mut smallest_that_fits, mut largest): (Option<usize>, Option<usize>) = (None, None);
+        for (index, FreeVec { capacity, list }) in free.iter().enumerate() {
+            if !list.is::<Vec<T>>() {
+                continue;
+            }
+            if *capacity >= count && smallest_that_fits.is_none_or(|best| *capacity < free[best].capacity) {
+                smallest_that_fits = Some(index);
+            }
+            if largest.is_none_or(|best| *capacity >= free[best].capacity) {
+                largest = Some(index);
+            }
+        }
+        let unused = free.swap_remove(smallest_that_fits.or(largest)?);
+        smallest_that_fits.and_then(|_| unused.list.downcast().ok().map(|list| *list))
     }
 }
 

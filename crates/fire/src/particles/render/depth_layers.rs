@@ -68,11 +68,16 @@ impl DepthLayers {
         let deviation = if total > 0.0 { (second / total - mean * mean).max(0.0).sqrt() } else { 0.0 };
         let mut thickness = min_thickness.max(1e-6);
         let (near, far) = ((mean - 2.0 * deviation).max(0.0), (mean + 2.0 * deviation).max(0.0));
-        let count = |thickness: f64| (far / thickness).floor() - (near / thickness).floor() + 1.0;
-        while count(thickness) > MAX_LAYERS as f64 {
+        while Self::layer_count(near, far, thickness) > MAX_LAYERS as f64 {
             thickness *= 2.0;
         }
-        Self { near: (near / thickness).floor() * thickness, thickness, count: count(thickness) as usize }
+        let count = Self::layer_count(near, far, thickness) as usize;
+        Self { near: (near / thickness).floor() * thickness, thickness, count }
+    }
+
+    /// Number of layers that an interval of depth touches; may be too large for an integer.
+    fn layer_count(near: f64, far: f64, thickness: f64) -> f64 {
+        (far / thickness).floor() - (near / thickness).floor() + 1.0
     }
 
     /// The layer in front of a depth, and the weight of the next layer there (linear interpolation between layer centers).
@@ -91,8 +96,10 @@ impl DepthLayers {
     /// Depth interval of each layer.
     pub(crate) fn intervals(&self) -> impl Iterator<Item = DepthInterval> + use<> {
         let Self { near, thickness, count } = *self;
-        let edge = move |layer: usize| near + layer as f64 * thickness;
-        (0..count).map(move |layer| DepthInterval { near: edge(layer), far: edge(layer + 1) })
+        (0..count).map(move |layer| {
+            let [near, far] = [layer, layer + 1].map(|edge| near + edge as f64 * thickness);
+            DepthInterval { near, far }
+        })
     }
 }
 
@@ -167,15 +174,17 @@ impl ScaleSums {
 impl GasStatistics {
     pub(crate) fn new(gas: &Gas, rendering: &GasRenderingParameters, view: &GasView) -> Self {
         let (count, level) = (gas.particles.len(), bansho_base::math::simd::level());
-        let of_task = |task: usize| {
-            let mut statistics = Self::default();
-            let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
-            dispatch!(level, _simd => statistics.add_all(gas, rendering, view, range.clone()));
-            statistics
-        };
+        let tasks = (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter();
+        let statistics_of_tasks: Vec<Self> = tasks
+            .map(|task| {
+                let mut statistics = Self::default();
+                let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
+                dispatch!(level, _simd => statistics.add_all(gas, rendering, view, range.clone()));
+                statistics
+            })
+            .collect();
         // Tasks are summed in order, so that the result does not depend on the number of threads.
-        let of_tasks: Vec<Self> = (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter().map(of_task).collect();
-        of_tasks.iter().fold(Self::default(), Self::merge)
+        statistics_of_tasks.iter().fold(Self::default(), Self::merge)
     }
 
     #[inline(always)]

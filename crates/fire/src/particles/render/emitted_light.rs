@@ -103,17 +103,20 @@ fn slabs(gas: &Gas, rendering: &GasRenderingParameters, t: f64) -> Vec<Slab> {
     let (low, high) = height_range(gas, t);
     let step = ((high - low) / (SLABS - 1) as f64).max(1e-9);
     let level = bansho_base::math::simd::level();
-    let task_slabs = |range: Range<usize>| {
+    let slabs_of_tasks = tasks(gas).into_par_iter().map(|range| {
         let mut slabs = vec![Slab::default(); SLABS + 1];
         dispatch!(level, _simd => add_to_slabs(gas, rendering, t, range.clone(), [low, step], &mut slabs));
         slabs
-    };
+    });
+    let slabs_of_tasks: Vec<Vec<Slab>> = slabs_of_tasks.collect();
     // Tasks are summed in order, so that the result does not depend on the number of threads.
-    let of_tasks: Vec<Vec<Slab>> = tasks(gas).into_par_iter().map(task_slabs).collect();
-    of_tasks.into_iter().fold(vec![Slab::default(); SLABS + 1], |mut sums, slabs| {
-        sums.iter_mut().zip(&slabs).for_each(|(sum, slab)| sum.add(slab, 1.0));
-        sums
-    })
+    let mut sums = vec![Slab::default(); SLABS + 1];
+    for slabs in &slabs_of_tasks {
+        for (sum, slab) in sums.iter_mut().zip(slabs) {
+            sum.add(slab, 1.0);
+        }
+    }
+    sums
 }
 
 /// The particle range of each task.
@@ -124,13 +127,17 @@ fn tasks(gas: &Gas) -> Vec<Range<usize>> {
 
 /// Minimum and maximum height of the particles, m.
 fn height_range(gas: &Gas, t: f64) -> (f64, f64) {
-    let task_range = |range: Range<usize>| {
-        range
-            .map(|index| gas.position(index, t).y)
-            .fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
-    };
-    let min_max = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    tasks(gas).into_par_iter().map(task_range).reduce_with(min_max).unwrap_or((f64::MAX, f64::MIN))
+    let ranges_of_tasks = tasks(gas).into_par_iter().map(|range| {
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        for index in range {
+            let y = gas.position(index, t).y;
+            (low, high) = (low.min(y), high.max(y));
+        }
+        (low, high)
+    });
+    ranges_of_tasks
+        .reduce_with(|(low, high), (other_low, other_high)| (low.min(other_low), high.max(other_high)))
+        .unwrap_or((f64::MAX, f64::MIN))
 }
 
 /// Adds particles to slabs that are `step` apart, from the height `low` on.

@@ -117,9 +117,12 @@ impl ExposedGas {
 
     /// Light and opacity of a layer at a pixel.
     fn pixel(&self, x: usize, y: usize, layer: usize) -> [f32; 4] {
-        let at = |layer: usize, plane: usize| self.value([x, y], layer, plane);
-        let in_front = 1.0 - (0..layer).map(|layer| at(layer, 3)).sum::<f32>();
-        if in_front < OPAQUE { [0.0; 4] } else { [0, 1, 2, 3].map(|plane| at(layer, plane) / in_front) }
+        let opacity_in_front: f32 = (0..layer).map(|nearer| self.value([x, y], nearer, 3)).sum();
+        let transmittance = 1.0 - opacity_in_front;
+        if transmittance < OPAQUE {
+            return [0.0; 4];
+        }
+        [0, 1, 2, 3].map(|plane| self.value([x, y], layer, plane) / transmittance)
     }
 
     fn value(&self, [x, y]: [usize; 2], layer: usize, plane: usize) -> f32 {
@@ -134,8 +137,9 @@ impl ExposedGas {
         }
         let rect = self.rect.intersection(&strip.rect);
         for (x, y) in (rect.y..rect.bottom()).flat_map(|y| (rect.x..rect.right()).map(move |x| (x, y))) {
-            let at = |plane: usize| self.value([x, y], layer.index, LIGHT_PLANES + plane);
-            let measured = Measured { tau: at(0), luminance: at(1), luminance_kelvin: at(2) };
+            let [tau, luminance, luminance_kelvin] =
+                [0, 1, 2].map(|plane| self.value([x, y], layer.index, LIGHT_PLANES + plane));
+            let measured = Measured { tau, luminance, luminance_kelvin };
             if measured.tau > 0.0 {
                 measured.write(strip, layer.depth as f32, [x, y], self.temperatures, motion);
             }

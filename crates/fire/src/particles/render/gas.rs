@@ -81,11 +81,14 @@ impl Gas<'_> {
     /// Position of particle `index` at `t`, m, extrapolated by its velocity.
     #[inline(always)]
     pub(crate) fn position(&self, index: usize, t: f64) -> DVec3 {
+        let GasParticles { origin, position: [x, y, z], velocity: [u, v, w], .. } = self.particles;
         let since = t - self.time;
-        let coordinate = |axis: usize| {
-            f64::from(self.particles.position[axis][index]) + since * f64::from(self.particles.velocity[axis][index])
-        };
-        self.particles.origin + DVec3::new(coordinate(0), coordinate(1), coordinate(2))
+        let offset = DVec3::new(
+            f64::from(x[index]) + since * f64::from(u[index]),
+            f64::from(y[index]) + since * f64::from(v[index]),
+            f64::from(z[index]) + since * f64::from(w[index]),
+        );
+        *origin + offset
     }
 
     /// Volume m / rho that a particle represents, m^3, times the factor of its fade-out.

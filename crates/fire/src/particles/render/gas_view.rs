@@ -49,12 +49,13 @@ impl GasView {
 
     /// A part of the exposure of a view, in pixels of which `finer` times `finer` make one of the view's.
     pub(crate) fn sample(view: &View, shutter: Shutter, finer: usize) -> Self {
-        let camera_at = |t| with_finer_pixels(view.camera_at(t), finer);
+        let [open, camera, close, next] = [shutter.open, shutter.middle(), shutter.close, view.next_middle]
+            .map(|t| with_finer_pixels(view.camera_at(t), finer));
         let Rect { x, y, width, height } = view.window;
         Self {
-            camera: camera_at(shutter.middle()),
-            ends: Some([shutter.open, shutter.close].map(camera_at)),
-            next: camera_at(view.next_middle),
+            camera,
+            ends: Some([open, close]),
+            next,
             next_middle: view.next_middle,
             shutter,
             size: view.size.map(|side| side * finer),

@@ -104,11 +104,11 @@ fn color(density_ratio: f64) -> [f32; 3] {
     rgb.map(|value| value * scale * (0.35 + 0.65 * red))
 }
 
+/// The pixels of a square within the window, if there are any.
 fn square_rect(center: [f32; 2], side: f32, window: Rect) -> Option<Rect> {
-    let clip = |value: f32, from: usize, to: usize| (value.max(0.0) as usize).clamp(from, to);
     let low = center.map(|value| (value - 0.5 * side).round());
     let high = low.map(|value| value + side.round().max(1.0));
-    let (x, y) = (clip(low[0], window.x, window.right()), clip(low[1], window.y, window.bottom()));
-    let (right, bottom) = (clip(high[0], window.x, window.right()), clip(high[1], window.y, window.bottom()));
+    let [x, right] = [low[0], high[0]].map(|edge| (edge.max(0.0) as usize).clamp(window.x, window.right()));
+    let [y, bottom] = [low[1], high[1]].map(|edge| (edge.max(0.0) as usize).clamp(window.y, window.bottom()));
     (right > x && bottom > y).then(|| Rect { x, y, width: right - x, height: bottom - y })
 }

@@ -298,11 +298,10 @@ fn splat_gas<'a>(
         SplatResult::Empty => return DrawMode::Empty,
     };
     let extents = ColumnExtents::new(&grid, layers.count);
-    let with_strain = |detail: Detail| {
+    let detail = detail.map(|detail| {
         let strain = Strain::new(&grid, &extents, layers.count, detail.cell_pixels);
         (detail, strain)
-    };
-    let detail = detail.map(with_strain);
+    });
     let (weights, covered) = (grid.cells.spline_weights(), grid.covered());
     let end = covered.right().next_multiple_of(LANES).min(view.size[0]);
     DrawMode::SplattedGas(Box::new(SplattedGas {

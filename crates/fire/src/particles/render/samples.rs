@@ -35,11 +35,11 @@ impl<'a> GasExposure<'a> {
         if self.is_short && time_samples(view.shutter, view, scale).count() == 1 {
             return vec![whole];
         }
-        let of_state = |state: &GasState<'a>| {
-            let gas = state.gas;
-            time_samples(state.shutter, view, scale).map(move |shutter| GasState { gas, shutter })
-        };
-        self.states.iter().flat_map(of_state).collect()
+        let mut samples = Vec::with_capacity(self.states.len());
+        for &GasState { gas, shutter } in &self.states {
+            samples.extend(time_samples(shutter, view, scale).map(|shutter| GasState { gas, shutter }));
+        }
+        samples
     }
 }
 
@@ -77,8 +77,9 @@ pub(crate) fn time_samples(
         (motion / (MAX_MOTION_RADII * scale.radius.max(1.0))).ceil().clamp(1.0, MAX_TIMES_PER_STATE as f64) as usize
     });
     (0..count).map(move |index| {
-        let edge = |index: usize| shutter.open + shutter.duration() * index as f64 / count as f64;
-        Shutter { open: edge(index), close: edge(index + 1) }
+        let [open, close] =
+            [index, index + 1].map(|edge| shutter.open + shutter.duration() * edge as f64 / count as f64);
+        Shutter { open, close }
     })
 }
 

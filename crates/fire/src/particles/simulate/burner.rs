@@ -106,6 +106,11 @@ impl Burner {
         })
     }
 
+    /// Whether it emits gas at any time.
+    pub(crate) fn emits_gas(&self) -> bool {
+        self.parameters.flow.bounds()[1] > 0.0
+    }
+
     /// Position of its center at `t`, m from the flame's position.
     pub(crate) fn position(&self, t: f64) -> DVec3 {
         self.parameters.position.at(t).into()
@@ -187,6 +192,13 @@ struct BurnerSize {
     mesh: Option<Arc<Mesh>>,
 }
 
+impl BurnerSize {
+    /// The size of an analytic shape, m and m^2.
+    fn new(diameter: f64, area_m2: f64, bounding_radius: f64) -> Self {
+        Self { diameter, area_m2, bounding_radius, mesh: None }
+    }
+}
+
 /// Corners of the bounding box of a rotated mesh.
 fn mesh_extent(mesh: &Mesh, placement: &Transform) -> [DVec3; 2] {
     let corners = mesh.triangles().flatten().map(|corner| placement.point_in_world(corner));
@@ -197,17 +209,17 @@ fn mesh_extent(mesh: &Mesh, placement: &Transform) -> [DVec3; 2] {
 fn primitive_extent(parameters: &BurnerParameters, placement: &Transform) -> [DVec3; 2] {
     let BurnerParameters { diameter, length, size, .. } = *parameters;
     let radius = 0.5 * diameter;
-    let axis = |unit: DVec3, half: f64| placement.direction_in_world(unit) * half;
+    let [right, up, back] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| placement.direction_in_world(axis));
     let half = match parameters.shape {
         BurnerShape::Point | BurnerShape::Mesh => DVec3::splat(radius),
         BurnerShape::Disk => {
-            let [x, z] = [axis(DVec3::X, radius), axis(DVec3::Z, radius)];
+            let [x, z] = [right * radius, back * radius];
             DVec3::from([0, 1, 2].map(|c| math::sqrt(x[c] * x[c] + z[c] * z[c])))
         }
-        BurnerShape::Line => axis(DVec3::X, 0.5 * length).abs() + axis(DVec3::Z, radius).abs(),
+        BurnerShape::Line => (right * (0.5 * length)).abs() + (back * radius).abs(),
         BurnerShape::Box => {
             let [x, y, z] = size.map(|side| 0.5 * side);
-            axis(DVec3::X, x).abs() + axis(DVec3::Y, y).abs() + axis(DVec3::Z, z).abs()
+            (right * x).abs() + (up * y).abs() + (back * z).abs()
         }
     };
     [-half, half]
@@ -220,14 +232,15 @@ fn surface(
 ) -> Result<(BurnerSurface, BurnerSize), ParticleErrorKind> {
     let BurnerParameters { diameter, length, size: [x, y, z], scale, .. } = *parameters;
     let disk_area = 0.25 * std::f64::consts::PI * diameter * diameter;
-    let size = |diameter, area_m2, bounding_radius| BurnerSize { diameter, area_m2, bounding_radius, mesh: None };
     Ok(match parameters.shape {
-        BurnerShape::Disk => (BurnerSurface::Disk, size(diameter, disk_area, 0.5 * diameter)),
-        BurnerShape::Point => (BurnerSurface::Ball, size(diameter, disk_area, 0.5 * diameter)),
-        BurnerShape::Line => (BurnerSurface::Strip, size(diameter, diameter * length, 0.5 * (diameter + length))),
+        BurnerShape::Disk => (BurnerSurface::Disk, BurnerSize::new(diameter, disk_area, 0.5 * diameter)),
+        BurnerShape::Point => (BurnerSurface::Ball, BurnerSize::new(diameter, disk_area, 0.5 * diameter)),
+        BurnerShape::Line => {
+            (BurnerSurface::Strip, BurnerSize::new(diameter, diameter * length, 0.5 * (diameter + length)))
+        }
         BurnerShape::Box => {
             let surface = 2.0 * (x * y + y * z + z * x);
-            (BurnerSurface::Box, size(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
+            (BurnerSurface::Box, BurnerSize::new(x.min(z), surface, 0.5 * DVec3::new(x, y, z).length()))
         }
         BurnerShape::Mesh => {
             let file = parameters.file.as_ref().ok_or(ParticleErrorKind::NoFile)?;
@@ -238,7 +251,10 @@ fn surface(
             let area_m2 = sampler.area() * scale * scale;
             let across = sides.x.min(sides.z).max(0.2 * sides.max_element());
             let bounding_radius = min.abs().max(max.abs()).length() * scale;
-            (BurnerSurface::Mesh(sampler), BurnerSize { mesh: Some(mesh), ..size(across, area_m2, bounding_radius) })
+            (
+                BurnerSurface::Mesh(sampler),
+                BurnerSize { mesh: Some(mesh), ..BurnerSize::new(across, area_m2, bounding_radius) },
+            )
         }
     })
 }

@@ -33,6 +33,20 @@ struct Contact {
     normal: DVec3,
 }
 
+/// The straight path of a particle in a sub-step.
+struct Segment {
+    start: DVec3,
+    displacement: DVec3,
+    length: f64,
+}
+
+impl Segment {
+    /// The point at a distance from the start, m; the end beyond it.
+    fn at(&self, distance: f64) -> DVec3 {
+        self.start + self.displacement * (distance / self.length.max(f64::MIN_POSITIVE)).min(1.0)
+    }
+}
+
 impl Colliders<'_> {
     /// Moves a particle from `position` by `displacement`, and removes the components of its velocities that point into solids.
     /// Returns the new position and velocities.
@@ -69,27 +83,28 @@ impl Colliders<'_> {
     /// First point of the displacement within the clearance of a solid, by sphere tracing; `None` if there is none.
     fn contact(&self, occluder: &Occluder, start: DVec3, to: DVec3) -> Option<Contact> {
         let clearance = f64::from(self.clearance);
-        let (displacement, length) = (to - start, (to - start).length());
-        let at = |distance_along: f64| start + displacement * (distance_along / length.max(f64::MIN_POSITIVE)).min(1.0);
+        let segment = Segment { start, displacement: to - start, length: (to - start).length() };
         let (mut last_free, mut distance_along) = (0.0, 0.0);
         loop {
-            let distance = occluder.signed_distance(at(distance_along)) - clearance;
+            let distance = occluder.signed_distance(segment.at(distance_along)) - clearance;
             if distance < 0.0 {
                 for _ in 0..BISECTION_STEPS {
                     let middle = 0.5 * (last_free + distance_along);
-                    let inside = occluder.signed_distance(at(middle)) < clearance;
+                    let inside = occluder.signed_distance(segment.at(middle)) < clearance;
                     if inside { distance_along = middle } else { last_free = middle }
                 }
-                return Some(Contact { position: at(distance_along), normal: occluder.normal(at(distance_along)) });
+                let position = segment.at(distance_along);
+                return Some(Contact { position, normal: occluder.normal(position) });
             }
             last_free = distance_along;
-            if distance_along >= length || distance > DISTANCE_OVERESTIMATE * (length - distance_along) {
+            if distance_along >= segment.length || distance > DISTANCE_OVERESTIMATE * (segment.length - distance_along)
+            {
                 return None;
             }
             // The clearance makes every solid at least twice as thick, so that none is stepped over.
             distance_along = (distance_along
-                + (distance / DISTANCE_OVERESTIMATE).max(clearance).max(length / MAX_MARCH_STEPS))
-            .min(length);
+                + (distance / DISTANCE_OVERESTIMATE).max(clearance).max(segment.length / MAX_MARCH_STEPS))
+            .min(segment.length);
         }
     }
 

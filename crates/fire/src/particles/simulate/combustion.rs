@@ -16,7 +16,7 @@ use crate::particles::{
         forces::external_forces::{BurnerForces, ExternalForces},
         particle_lanes::{BatchUpdate, RowBatch, SharedColumns, for_each_burner_batch},
         particles::GasParticles,
-        vectors::{add_scaled, length},
+        vectors::{add_scaled, length, linear, scaled},
     },
 };
 
@@ -105,12 +105,14 @@ impl CombustionModel {
         conditions: &AmbientConditions<R>,
         seconds: f32,
     ) -> ParticleState<R> {
-        let splat = |value: f32| state.fuel.broadcast(value);
         // Exposed gas burns faster than the mean, enclosed gas slower; gas with an exposure of 1/3 burns at the mean rate.
         let air_factor =
-            conditions.air_exposure.fma(splat(2.4 * self.oxygen_dependence), splat(1.0 - 0.8 * self.oxygen_dependence));
-        let fuel = (state.fuel - conditions.burning * air_factor * splat(seconds)).simd_max(splat(0.0));
-        let growth = conditions.mixing.fma(splat(seconds * (1.0 / 3.0)), splat(1.0));
+            linear(conditions.air_exposure, 2.4 * self.oxygen_dependence, 1.0 - 0.8 * self.oxygen_dependence);
+        let burned = scaled(conditions.burning * air_factor, seconds);
+        let fuel = (state.fuel - burned).simd_max(burned.broadcast(0.0));
+        // The volume grows by the entrained air: a radius by a third of that.
+        let growth = linear(conditions.mixing, seconds * (1.0 / 3.0), 1.0);
+        let max_radius = growth.broadcast(MAX_RADIUS_GROWTH * conditions.spawn_radius);
         ParticleState {
             fuel,
             temperature: if self.simulates_temperature {
@@ -118,42 +120,39 @@ impl CombustionModel {
             } else {
                 state.temperature
             },
-            soot: splat(self.soot_fraction) * self.relative_soot(fuel),
-            support_radius: (state.support_radius * growth)
-                .simd_min(splat(MAX_RADIUS_GROWTH * conditions.spawn_radius)),
+            soot: scaled(self.relative_soot(fuel), self.soot_fraction),
+            support_radius: (state.support_radius * growth).simd_min(max_radius),
         }
     }
 
     /// Temperature after heating, mixing and radiation. Each is integrated implicitly, so that time steps of any length are stable.
     #[inline(always)]
     fn temperature<R: Real>(&self, state: ParticleState<R>, conditions: &AmbientConditions<R>, seconds: f32) -> R {
-        let splat = |value: f32| state.fuel.broadcast(value);
-        let air = splat(conditions.air_temperature);
-        let front = conditions.air_exposure.simd_sqrt().fma(splat(1.0 - INNER_TEMPERATURE), splat(INNER_TEMPERATURE));
-        let (flame, heating) = (front * splat(self.flame_temperature), splat(seconds / self.heating_time_s));
+        let fuel = state.fuel;
+        let air = fuel.broadcast(conditions.air_temperature);
+        let front = linear(conditions.air_exposure.simd_sqrt(), 1.0 - INNER_TEMPERATURE, INNER_TEMPERATURE);
+        let flame = scaled(front, self.flame_temperature);
         // Burning gas approaches the flame temperature, burnt gas that of the air.
-        let target = state.fuel.select_lt(splat(f32::MIN_POSITIVE), air, flame);
-        let rate = state.fuel.select_lt(
-            splat(f32::MIN_POSITIVE),
-            conditions.mixing * splat(BURNT_MIXING_FACTOR * seconds),
-            heating,
-        );
-        let temperature = relax_implicit(state.temperature, target, rate);
-        // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a relaxation rate toward the temperature of the air.
-        let absorption = state.soot * temperature * splat(PLANCK_MEAN_SOOT_ABSORPTION);
+        let none = fuel.broadcast(f32::MIN_POSITIVE);
+        let target = fuel.select_lt(none, air, flame);
+        let (heating, cooling) =
+            (fuel.broadcast(seconds / self.heating_time_s), scaled(conditions.mixing, BURNT_MIXING_FACTOR * seconds));
+        let temperature = relax_implicit(state.temperature, target, fuel.select_lt(none, cooling, heating));
+        // 4 sigma kappa (T^4 - T_air^4) / (rho c_p), as a relaxation rate toward the temperature of the air: T^4 - T_air^4 is (T - T_air) times
+        // (T^2 + T_air^2) (T + T_air).
+        let absorption = scaled(state.soot * temperature, PLANCK_MEAN_SOOT_ABSORPTION);
         let fourth = temperature.fma(temperature, air * air) * (temperature + air);
         let power =
-            absorption * fourth * splat(self.radiative_cooling * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
+            scaled(absorption * fourth, self.radiative_cooling * 4.0 * STEFAN_BOLTZMANN * seconds / SPECIFIC_HEAT);
         relax_implicit(temperature, air, power / conditions.density)
     }
 
     /// Soot relative to that of burning gas: 0 in fresh gas, the smoke fraction in burnt gas.
     #[inline(always)]
     pub(crate) fn relative_soot<R: Real>(&self, fuel: R) -> R {
-        let splat = |value: f32| fuel.broadcast(value);
-        let formed = ((splat(SOOT_FUEL_RANGE[1]) - fuel) * splat(1.0 / SOOT_FORMATION_WIDTH)).simd_smoothstep();
-        let unburnt = (fuel * splat(1.0 / SOOT_FUEL_RANGE[0])).simd_smoothstep();
-        formed * unburnt.fma(splat(1.0 - self.smoke_fraction), splat(self.smoke_fraction))
+        let formed = scaled(fuel.broadcast(SOOT_FUEL_RANGE[1]) - fuel, 1.0 / SOOT_FORMATION_WIDTH).simd_smoothstep();
+        let unburnt = scaled(fuel, 1.0 / SOOT_FUEL_RANGE[0]).simd_smoothstep();
+        formed * linear(unburnt, 1.0 - self.smoke_fraction, self.smoke_fraction)
     }
 }
 
@@ -277,29 +276,33 @@ impl CombustionStep<'_> {
     /// Exposure to air, from the offset of the mean position of the neighbors (at a surface) or from the lack of neighbors (isolated).
     #[inline(always)]
     fn air_exposure<R: Real>(&self, weight: R, neighborhood: &Neighborhood<R>) -> R {
-        let splat = |value: f32| weight.broadcast(value);
-        let one_over_sum = splat(1.0) / neighborhood.weight.simd_max(splat(f32::MIN_POSITIVE));
-        let offset = length(&neighborhood.offset) * one_over_sum * splat(1.0 / (self.radius * SURFACE_OFFSET));
-        let own_fraction = weight * one_over_sum * splat(KernelShape::Poly6.at_center::<3>(self.radius));
-        let isolated = (own_fraction - splat(ISOLATED_FRACTION[0])) * splat(1.0 / ISOLATED_FRACTION[1]);
+        let one_over_sum = weight.broadcast(1.0) / neighborhood.weight.simd_max(weight.broadcast(f32::MIN_POSITIVE));
+        let offset = scaled(length(&neighborhood.offset) * one_over_sum, 1.0 / (self.radius * SURFACE_OFFSET));
+        let own_fraction = scaled(weight * one_over_sum, KernelShape::Poly6.at_center::<3>(self.radius));
+        let isolated = scaled(own_fraction - weight.broadcast(ISOLATED_FRACTION[0]), 1.0 / ISOLATED_FRACTION[1]);
         offset.simd_max(isolated).simd_clamp01()
     }
 
     /// Weights with which differences of velocity and temperature to the neighbors are added.
     #[inline(always)]
     fn smoothing_weights<R: Real>(&self, density: R) -> [R; 2] {
-        let fraction = |smoothing: f32| (smoothing * self.seconds / SMOOTHING_TIME).min(MAX_SMOOTHING);
         let per_weight = density.simd_rsqrt();
         [
-            per_weight * density.broadcast(fraction(self.viscosity)),
-            per_weight * density.broadcast(fraction(self.conduction)),
+            scaled(per_weight, self.smoothed_fraction(self.viscosity)),
+            scaled(per_weight, self.smoothed_fraction(self.conduction)),
         ]
+    }
+
+    /// Fraction of the difference to its neighbors that a step removes; `smoothing` is that over [`SMOOTHING_TIME`].
+    #[inline(always)]
+    fn smoothed_fraction(&self, smoothing: f32) -> f32 {
+        (smoothing * self.seconds / SMOOTHING_TIME).min(MAX_SMOOTHING)
     }
 
     /// Fuel consumption rate of a mean particle at a speed, 1/s.
     #[inline(always)]
     fn burn_rate_at_speed<R: Real>(&self, burner: &BurnerForces, speed: R) -> R {
-        speed.fma(speed.broadcast(burner.burned_per_meter), speed.broadcast(burner.burned_per_second))
+        linear(speed, burner.burned_per_meter, burner.burned_per_second)
     }
 
     #[inline(always)]

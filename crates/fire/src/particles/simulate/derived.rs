@@ -219,13 +219,12 @@ fn check_within_domain(
     tolerance: f64,
 ) -> Result<(), (&'static str, ParticleErrorKind)> {
     let FlameParticlesParameters { domain_min, domain_max, .. } = parameters;
-    let beyond =
-        |corner, limit| Err((corner, ParticleErrorKind::OutsideDomain { position: position.into(), corner, limit }));
-    match (domain_min, domain_max) {
-        (Auto::Set(min), _) if (position + tolerance).cmplt(DVec3::from(*min)).any() => beyond("domain_min", *min),
-        (_, Auto::Set(max)) if (position - tolerance).cmpgt(DVec3::from(*max)).any() => beyond("domain_max", *max),
-        _ => Ok(()),
-    }
+    let (corner, limit) = match (domain_min, domain_max) {
+        (Auto::Set(min), _) if (position + tolerance).cmplt(DVec3::from(*min)).any() => ("domain_min", *min),
+        (_, Auto::Set(max)) if (position - tolerance).cmpgt(DVec3::from(*max)).any() => ("domain_max", *max),
+        _ => return Ok(()),
+    };
+    Err((corner, ParticleErrorKind::OutsideDomain { position: position.into(), corner, limit }))
 }
 
 #[cfg(test)]

@@ -58,15 +58,11 @@ impl FluidSolver {
     /// and the integration limits the remaining ones. If they did, forces of the last step would also have to be part of every snapshot.
     pub(crate) fn substep_count(&self, particles: &GasParticles, seconds: f32) -> u32 {
         let [u, v, w] = &particles.velocity;
-        let speed_squared = |index: usize| u[index] * u[index] + v[index] * v[index] + w[index] * w[index];
-        let max_over_particles = |values: &(dyn Fn(usize) -> f32 + Sync)| {
-            let tasks = (0..u.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
-            let task_max =
-                |first: usize| (first..(first + PARTICLES_PER_TASK).min(u.len())).map(values).fold(0.0, f32::max);
-            tasks.map(task_max).reduce_with(f32::max).unwrap_or(0.0)
-        };
-        let speed = max_over_particles(&speed_squared).sqrt();
-        let hottest = max_over_particles(&|index| particles.temperature[index]);
+        let max_speed_squared = max_over_particles(particles.len(), |index| {
+            u[index] * u[index] + v[index] * v[index] + w[index] * w[index]
+        });
+        let speed = max_speed_squared.sqrt();
+        let hottest = max_over_particles(particles.len(), |index| particles.temperature[index]);
         let max_step =
             max_stable_step(self.support_radius(), self.stiffness_per_kelvin * hottest, RELATIVE_SPEED * speed);
         substep_count(seconds, max_step, self.max_substeps)
@@ -97,6 +93,19 @@ impl FluidSolver {
     pub(crate) fn sum_over_neighbors(&mut self, particles: &GasParticles) {
         self.neighbor_sums.compute(&self.cells, particles);
     }
+}
+
+/// The maximum of `value` over particles of the indices below `count`, at least 0. It is the same for any order of the tasks.
+fn max_over_particles(count: usize, value: impl Fn(usize) -> f32 + Sync) -> f32 {
+    let tasks = (0..count).into_par_iter().step_by(PARTICLES_PER_TASK);
+    let max_of_tasks = tasks.map(|first| {
+        let mut max = 0.0_f32;
+        for index in first..(first + PARTICLES_PER_TASK).min(count) {
+            max = max.max(value(index));
+        }
+        max
+    });
+    max_of_tasks.reduce_with(f32::max).unwrap_or(0.0)
 }
 
 /// `w_j W` times 1, the differences of velocity and temperature, and the offset to the neighbor.

@@ -17,7 +17,7 @@ use crate::particles::{
     parameters::WindForce,
     simulate::{
         forces::external_forces::{BurnerForces, ExternalForces},
-        vectors::{add_scaled, clamp_length, length, subtract},
+        vectors::{add_scaled, clamp_length, length, scaled, subtract},
     },
 };
 
@@ -130,21 +130,21 @@ impl IntegrationStep<'_> {
     #[inline(always)]
     fn apply_forces<R: Real>(&self, burner: &BurnerForces, gas: &ForceInputs<R>, wind: &[R; 3]) -> [R; 3] {
         let Self { forces, seconds, .. } = *self;
-        let splat = |value: f32| gas.density.broadcast(value);
+        let one = gas.density.broadcast(1.0);
         let mut acceleration = clamp_length(&gas.acceleration, max_acceleration(self.radius, seconds));
-        let density_ratio = gas.temperature * splat(1.0 / forces.air_temperature);
-        acceleration[1] = (density_ratio - splat(1.0)).fma(splat(forces.buoyancy), acceleration[1]);
+        let density_ratio = scaled(gas.temperature, 1.0 / forces.air_temperature);
+        acceleration[1] = (density_ratio - one).fma(one.broadcast(forces.buoyancy), acceleration[1]);
         let per_volume = forces.wind == WindForce::BodyForce;
         if per_volume {
-            acceleration =
-                add_scaled(&acceleration, wind, splat(forces.wind_response) / gas.density.simd_max(splat(MIN_DENSITY)));
+            let density = gas.density.simd_max(one.broadcast(MIN_DENSITY));
+            acceleration = add_scaled(&acceleration, wind, one.broadcast(forces.wind_response) / density);
         }
-        let accelerated = add_scaled(&gas.own_velocity, &acceleration, splat(seconds));
+        let accelerated = add_scaled(&gas.own_velocity, &acceleration, one.broadcast(seconds));
         // Entrained air adds its momentum.
         let gain = if per_volume { 0.0 } else { forces.wind_response };
-        let air = [wind[0] * splat(gain), wind[1] * splat(gain), wind[2] * splat(gain)];
-        let rate = burner.mixing(&gas.velocity, wind, gas.air_exposure) * splat(seconds);
-        let mix_weight = splat(1.0) / (rate + splat(1.0));
+        let air = [scaled(wind[0], gain), scaled(wind[1], gain), scaled(wind[2], gain)];
+        let rate = scaled(burner.mixing(&gas.velocity, wind, gas.air_exposure), seconds);
+        let mix_weight = one / (rate + one);
         let mut mixed = add_scaled(&accelerated, &air, rate);
         for c in 0..3 {
             mixed[c] = mixed[c] * mix_weight;

@@ -55,10 +55,15 @@ impl Spawner<'_> {
     /// Number of particles spawned until `t`, including a fraction.
     fn spawned_count(&self, burner_index: usize, burner: &Burner, t: f64) -> f64 {
         let constants = self.constants;
-        // Warped time makes the flow pulsate without changing its mean.
-        let angular_frequency = std::f64::consts::TAU * constants.puffing_hz[burner_index];
-        let warped = |t: f64| t + constants.pulse / angular_frequency * math::sin(angular_frequency * t);
-        constants.rates[burner_index] * burner.parameters.flow.integral(warped(-constants.preroll), warped(t))
+        let start = self.pulsating_time(burner_index, -constants.preroll);
+        let end = self.pulsating_time(burner_index, t);
+        constants.rates[burner_index] * burner.parameters.flow.integral(start, end)
+    }
+
+    /// Time that passes faster and slower as a burner puffs, s: `t + pulse sin(omega t) / omega`. A flow over this time pulsates, with an unchanged mean.
+    fn pulsating_time(&self, burner_index: usize, t: f64) -> f64 {
+        let angular_frequency = std::f64::consts::TAU * self.constants.puffing_hz[burner_index];
+        t + self.constants.pulse / angular_frequency * math::sin(angular_frequency * t)
     }
 
     /// Spawns particle `id` at `t`; it has reached `age` at the end of the step.

@@ -1,6 +1,18 @@
-//! Operations on vectors of three or four components, each a scalar or a SIMD vector.
+//! Operations on scalars or SIMD vectors with constants, and on vectors of three or four components, each a scalar or a SIMD vector.
 
 use bansho_base::math::simd::Real;
+
+/// `factor * x`.
+#[inline(always)]
+pub(crate) fn scaled<R: Real>(x: R, factor: f32) -> R {
+    x * x.broadcast(factor)
+}
+
+/// `slope * x + offset`, rounded once.
+#[inline(always)]
+pub(crate) fn linear<R: Real>(x: R, slope: f32, offset: f32) -> R {
+    x.fma(x.broadcast(slope), x.broadcast(offset))
+}
 
 /// Dot product.
 #[inline(always)]
@@ -37,9 +49,9 @@ pub(crate) fn add_scaled<R: Real>(one: &[R; 3], other: &[R; 3], factor: R) -> [R
 /// Scales a vector down to `max_length` where it is longer.
 #[inline(always)]
 pub(crate) fn clamp_length<R: Real>(vector: &[R; 3], max_length: f32) -> [R; 3] {
-    let splat = |value: f32| vector[0].broadcast(value);
-    let squared = dot(vector, vector).simd_max(splat(f32::MIN_POSITIVE));
-    let scale = (squared.simd_rsqrt() * splat(max_length)).simd_min(splat(1.0));
+    // The reciprocal root is for normal numbers above 0.
+    let squared = dot(vector, vector).simd_max(vector[0].broadcast(f32::MIN_POSITIVE));
+    let scale = scaled(squared.simd_rsqrt(), max_length).simd_min(vector[0].broadcast(1.0));
     let mut clamped = *vector;
     for c in 0..3 {
         clamped[c] = vector[c] * scale;

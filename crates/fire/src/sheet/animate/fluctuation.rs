@@ -23,14 +23,16 @@ impl Fluctuation {
     ///
     /// `roughness` in [0, 1] weights the higher frequencies.
     pub(crate) fn new(key: Key, purpose: Purpose, frequency: f64, roughness: f64, fit: impl Fn(f64) -> f64) -> Self {
-        let first = key.uniforms(0, 0, purpose);
-        let second = key.uniforms(1, 0, purpose);
-        let phase = |i: usize| f64::from(if i < 4 { first[i] } else { second[i - 4] });
+        let mut phases = [0.0; WAVES];
+        let uniforms = key.uniforms(0, 0, purpose).into_iter().chain(key.uniforms(1, 0, purpose));
+        for (phase, uniform) in phases.iter_mut().zip(uniforms) {
+            *phase = f64::from(uniform);
+        }
         let raw = RATIOS.map(|ratio| if ratio <= 1.0 { 1.0 } else { roughness / math::sqrt(ratio) });
         let total: f64 = raw.iter().sum();
         Self {
             frequencies: RATIOS.map(|ratio| fit(ratio * frequency)),
-            phases: std::array::from_fn(phase),
+            phases,
             // Six sines hardly ever peak together: a factor of 1.4 makes use of the range, and rare larger sums are clamped.
             amplitudes: raw.map(|amplitude| (1.4 * amplitude / total) as f32),
         }

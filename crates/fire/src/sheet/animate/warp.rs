@@ -31,18 +31,13 @@ pub(crate) struct FlameWaves {
 impl FlameWaves {
     /// The fluctuations of a flame of this shape with the random numbers of `key`.
     pub(crate) fn new(shape: &SheetShapeParameters, key: Key, clock: &Clock) -> Self {
-        let edge_fluctuation = |name| {
-            let fit = |waves: f64| clock.waves(waves, 1.0);
-            Fluctuation::new(key, Purpose::named(name), shape.flutter_waves, 0.9, fit)
-        };
-        let time_fluctuation =
-            |name, hz, roughness| Fluctuation::new(key, Purpose::named(name), hz, roughness, |f| clock.frequency(f));
-        Self {
-            left: edge_fluctuation("left edge"),
-            right: edge_fluctuation("right edge"),
-            sway: time_fluctuation("sway", shape.sway_hz, 0.5),
-            flicker: time_fluctuation("flicker", shape.flicker_hz, 0.6),
-        }
+        // Edges scroll with the texture, so that in a loop a whole number of their waves passes; sway and flicker are functions of time.
+        let [left, right] = [Purpose::named("left edge"), Purpose::named("right edge")]
+            .map(|purpose| Fluctuation::new(key, purpose, shape.flutter_waves, 0.9, |waves| clock.waves(waves, 1.0)));
+        let [sway, flicker] =
+            [(Purpose::named("sway"), shape.sway_hz, 0.5), (Purpose::named("flicker"), shape.flicker_hz, 0.6)]
+                .map(|(purpose, hz, roughness)| Fluctuation::new(key, purpose, hz, roughness, |f| clock.frequency(f)));
+        Self { left, right, sway, flicker }
     }
 }
 
@@ -134,13 +129,9 @@ fn evaluate_warp(
 ) -> WarpState {
     let (time, scroll) = (clock.time(t), clock.scroll(t));
     let shape_parameters = &parameters.shape;
-    let edge_fluctuation = |waves: &Fluctuation| {
-        let mut values = [0.0; SEGMENTS + 1];
-        waves.fill(-scroll, 1.0 / SEGMENTS as f64, &mut values);
-        // P in [0, 1]; the weaker the flutter, the closer it stays to 1, the outer edge of the fringe.
-        values.map(|value| (0.5 * shape_parameters.flutter as f32).mul_add(value - 1.0, 1.0))
-    };
-    let edges = shape.edges(&edge_fluctuation(&waves.left), &edge_fluctuation(&waves.right));
+    let flutter = shape_parameters.flutter as f32;
+    let edges =
+        shape.edges(&edge_fluctuation(&waves.left, scroll, flutter), &edge_fluctuation(&waves.right, scroll, flutter));
     let center = center_line(parameters, waves, time, lean);
     let samples = (0..=16).map(|i| f64::from(center.at(i as f32 / 16.0)[0]));
     let center_range = samples.fold([0.0_f64; 2], |[low, high], value| [low.min(value), high.max(value)]);
@@ -148,6 +139,17 @@ fn evaluate_warp(
     // Sheets have headroom: at the mean height the flame fills 1 / (1 + flicker) of the sheet.
     let height_scale = ((1.0 + shape_parameters.flicker) / (1.0 + flicker)) as f32;
     WarpState { edges, center, center_range, height_scale, scroll }
+}
+
+/// P(w - s (t-t0)) of eq. (15), in [0, 1], over w after `scroll` sheet heights: the weaker the flutter, the closer it stays to 1, the outer edge of the fringe.
+#[inline(always)]
+fn edge_fluctuation(waves: &Fluctuation, scroll: f64, flutter: f32) -> [f32; SEGMENTS + 1] {
+    let mut values = [0.0; SEGMENTS + 1];
+    waves.fill(-scroll, 1.0 / SEGMENTS as f64, &mut values);
+    for value in &mut values {
+        *value = (0.5 * flutter).mul_add(*value - 1.0, 1.0);
+    }
+    values
 }
 
 /// Center line of a flame at one time. Its displacement is proportional to y^1.5, as for gas that accelerates upward in uniform wind; sway travels upward

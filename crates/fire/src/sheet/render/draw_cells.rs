@@ -90,12 +90,6 @@ impl CellSums {
     /// Starts empty sums over the pixels `rect` of a strip.
     fn reset(&mut self, rect: Rect, camera: &Camera, strip: &Strip) {
         let pixels = rect.width * rect.height;
-        let limit = |index: usize| {
-            let [x, y] = [rect.x + index % rect.width, rect.y + index / rect.width];
-            let is_shown = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).is_some();
-            let at = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
-            if is_shown { strip.plate_depth(at) } else { f32::NEG_INFINITY }
-        };
         let may_hide = strip.has_plate() || camera.lens == Lens::Fisheye;
         self.rect = rect;
         self.light.clear();
@@ -104,7 +98,13 @@ impl CellSums {
         self.depth.resize(pixels, f32::INFINITY);
         self.limit.clear();
         if may_hide {
-            self.limit.extend((0..pixels).map(limit));
+            for y in rect.y..rect.bottom() {
+                for x in rect.x..rect.right() {
+                    let is_shown = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).is_some();
+                    let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
+                    self.limit.push(if is_shown { strip.plate_depth(index) } else { f32::NEG_INFINITY });
+                }
+            }
         }
     }
 
@@ -203,9 +203,8 @@ struct Place {
 
 impl Place {
     fn new(origin: [f64; 2], rect: Rect) -> Self {
-        let corner = [rect.x, rect.y];
-        let pixel = |axis: usize| origin[axis].floor() as isize - corner[axis] as isize;
-        Self { fraction: origin.map(|at| (at - at.floor()) as f32), pixel: [pixel(0), pixel(1)] }
+        let [x, y] = origin.map(|at| at.floor() as isize);
+        Self { fraction: origin.map(|at| (at - at.floor()) as f32), pixel: [x - rect.x as isize, y - rect.y as isize] }
     }
 }
 
@@ -224,11 +223,13 @@ fn draw_cell_row<S: Simd, T: CellSample>(
     let height = (row as f32 + 0.5) / grid.rows as f32 * PATCHES as f32;
     let below = (height as usize).min(PATCHES - 1);
     let fraction = height - below as f32;
-    let at = |i: usize| cells.points[below][i].lerp(&cells.points[below + 1][i], fraction);
-    let knots: [Projected; PATCHES + 1] = std::array::from_fn(at);
     let up_scale = PATCHES as f32 / grid.rows as f32;
-    let ups: [[f32; 2]; PATCHES + 1] =
-        std::array::from_fn(|i| cells.points[below + 1][i].step_from(&cells.points[below][i], up_scale));
+    // The row's center line between the patches, and the vectors up to the next row.
+    let (mut knots, mut ups) = (cells.points[below], [[0.0; 2]; PATCHES + 1]);
+    for (i, above) in cells.points[below + 1].iter().enumerate() {
+        ups[i] = above.step_from(&knots[i], up_scale);
+        knots[i] = knots[i].lerp(above, fraction);
+    }
     if misses_rows(&knots, &ups, place.pixel[1], sums.rect.height) {
         return;
     }

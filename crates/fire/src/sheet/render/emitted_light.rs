@@ -64,15 +64,16 @@ impl FlameSheet {
         let row_intensities = self.row_intensities(flame, t);
         let count = self.parameters.light.count.max(1) as usize;
         let scale = self.parameters.light.scale as f32;
-        let light_position = |height: f64| base + DVec3::Y * (height * size.y);
-        (0..count)
-            .map(|index| equal_energy_segment(&row_intensities, index, count))
-            .filter(|segment| segment.intensity.iter().any(|value| *value * scale > 0.0))
-            .map(|segment| Light {
-                emitter: Emitter::Point { position: light_position(segment.height), radius: 0.15 * size.x },
-                intensity: segment.intensity.map(|value| value * scale),
-            })
-            .collect()
+        let mut lights = Vec::with_capacity(count);
+        for index in 0..count {
+            let segment = equal_energy_segment(&row_intensities, index, count);
+            let intensity = segment.intensity.map(|value| value * scale);
+            if intensity.iter().any(|value| *value > 0.0) {
+                let position = base + DVec3::Y * (segment.height * size.y);
+                lights.push(Light { emitter: Emitter::Point { position, radius: 0.15 * size.x }, intensity });
+            }
+        }
+        lights
     }
 }
 
@@ -105,15 +106,15 @@ struct LightSegment {
 fn equal_energy_segment(row_intensities: &RowIntensities, index: usize, count: usize) -> LightSegment {
     /// Height of a segment without energy.
     const DARK_HEIGHT: f64 = 0.3;
-    let energy = |row: &[f32; 3]| f64::from(row.iter().sum::<f32>().max(0.0));
-    let total: f64 = row_intensities.iter().map(energy).sum();
+    let energies = row_intensities.map(|row| f64::from(row.iter().sum::<f32>().max(0.0)));
+    let total: f64 = energies.iter().sum();
     let (from, to) = (total * index as f64 / count as f64, total * (index + 1) as f64 / count as f64);
     let (mut cumulative, mut intensity, mut height_moment) = (0.0, [0.0_f32; 3], 0.0);
-    for (row_index, row) in row_intensities.iter().enumerate() {
-        let next_cumulative = cumulative + energy(row);
+    for (row_index, (row, energy)) in row_intensities.iter().zip(energies).enumerate() {
+        let next_cumulative = cumulative + energy;
         let overlap = (next_cumulative.min(to) - cumulative.max(from)).max(0.0);
         if overlap > 0.0 {
-            let fraction = overlap / energy(row);
+            let fraction = overlap / energy;
             for k in 0..3 {
                 intensity[k] += row[k] * fraction as f32;
             }

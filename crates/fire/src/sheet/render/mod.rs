@@ -5,7 +5,6 @@ pub(crate) mod cells;
 pub(crate) mod draw;
 pub(crate) mod draw_cells;
 pub(crate) mod emitted_light;
-pub(crate) mod exposure_parts;
 pub(crate) mod prepared;
 pub(crate) mod projection;
 pub(crate) mod shade;

@@ -101,13 +101,13 @@ impl FlameSheet {
         let scale = pixels_per_meter(&view.camera, &quad);
         let count = self.time_samples(flame, view.shutter, scale);
         let depth = self.flame_depth(flame, view);
-        let grid = |texels_up: f64, top: f64| SheetCells::new(&view.camera, &quad, &CellResolution { texels_up, top });
         match self.parameters.method {
             _ if self.is_out(t) => {}
             SheetMethod::FlameTexture => {
                 let texels_up = flame.texture_source.texels_up();
                 let is_flame = self.content() == SheetContent::Flame;
-                let grid = grid(texels_up, if is_flame { self.height_fraction(t).min(1.0) } else { 1.0 });
+                let top = if is_flame { self.height_fraction(t).min(1.0) } else { 1.0 };
+                let grid = SheetCells::new(&view.camera, &quad, &CellResolution { texels_up, top });
                 let height_pixels = (scale * quad.size.y).max(grid.map_or(0.0, |_| small_height(texels_up)));
                 let texture = flame.texture_source.filtered(height_pixels, &self.filter_cache);
                 let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count, grid);
@@ -116,7 +116,8 @@ impl FlameSheet {
                 }
             }
             SheetMethod::SootField => {
-                let grid = grid(self.soot_texels_up(flame), 1.0);
+                let resolution = CellResolution { texels_up: self.soot_texels_up(flame), top: 1.0 };
+                let grid = SheetCells::new(&view.camera, &quad, &resolution);
                 let (samples, rect) = self.soot_samples(flame, view, surroundings, count, grid);
                 commands.push(DrawCommand { flame, depth, rect, item: DrawItem::SootField(samples) });
             }

@@ -70,14 +70,19 @@ impl PixelToSheet {
         let row = -camera.world_from_camera.col(1) * scale;
         let constant =
             -camera.world_from_camera.col(2) - column * camera.principal_point.x - row * camera.principal_point.y;
-        let form = |axis: DVec3| [constant, column, row].map(|direction| axis.dot(direction));
-        let inverse_depth = form(normal / offset);
-        let on_sheet = |axis: DVec3, size: f64, shift: f64| {
+        let directions = [constant, column, row];
+        let inverse_depth = directions.map(|direction| (normal / offset).dot(direction));
+        // The point at a depth is `position + direction depth`; its sheet coordinate, divided by the depth, is start / depth + slope.
+        let mut forms = [[0.0; 3], [0.0; 3], inverse_depth];
+        for (form, (axis, size, shift)) in
+            forms.iter_mut().zip([(quad.right, quad.size.x, 0.5), (quad.up, quad.size.y, 0.0)])
+        {
             let start = axis.dot(camera.position - quad.base) / size + shift;
-            let slope = form(axis / size);
-            std::array::from_fn(|i| start.mul_add(inverse_depth[i], slope[i]))
-        };
-        let forms = [on_sheet(quad.right, quad.size.x, 0.5), on_sheet(quad.up, quad.size.y, 0.0), inverse_depth];
+            for i in 0..3 {
+                let slope = (axis / size).dot(directions[i]);
+                form[i] = start.mul_add(inverse_depth[i], slope);
+            }
+        }
         Some(Self::Linear { forms, near: camera.near })
     }
 
@@ -167,11 +172,10 @@ fn ray_batch(camera: &Camera, quad: &UprightQuad, column: usize, row: usize) -> 
     let (px, py) = (column as f64 + 0.5, row as f64 + 0.5);
     let mut batch = SheetCoordinateArrays { x: [0.0; LANES], y: [MISS_Y; LANES], depth: [MISS_DEPTH; LANES] };
     let knots = [0.0, 7.5, 15.0].map(|step| intersect_sheet(camera, quad, px + step, py));
-    let is_nearly_linear = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
-        (a[2] - 2.0 * b[2] + c[2]).abs() < 0.002 * b[2] && (a[2] - c[2]).abs() < 0.1 * b[2]
-    };
     if let [Some(a), Some(b), Some(c)] = knots
-        && is_nearly_linear(a, b, c)
+        // The depth is nearly linear, and changes little.
+        && (a[2] - 2.0 * b[2] + c[2]).abs() < 0.002 * b[2]
+        && (a[2] - c[2]).abs() < 0.1 * b[2]
     {
         for i in 0..LANES {
             let s = i as f64 / 7.5 - 1.0;

@@ -26,20 +26,21 @@ pub(crate) struct DisplacementTables {
 impl DisplacementTables {
     pub(crate) fn new(field: &SootFieldParameters) -> Self {
         let key = Key::new(1988, "soot field");
-        let component = |name| {
-            let mut texels = fractal_noise(field.octaves as usize, field.gain as f32, key, Purpose::named(name));
+        let components = [Purpose::named("stir across"), Purpose::named("stir up")].map(|purpose| {
+            let mut texels = fractal_noise(field.octaves as usize, field.gain as f32, key, purpose);
             normalize(&mut texels);
             Arc::new(TextureTable::new(&texels))
-        };
-        Self { components: [component("stir across"), component("stir up")] }
+        });
+        Self { components }
     }
 
     /// Both components low-pass filtered for a sheet `height_pixels` tall.
     pub(crate) fn filtered(&self, layers: &FractalLayers, height_pixels: f64) -> Self {
         let level = math::log2(layers.texels_up() / height_pixels.max(1.0)) as f32;
-        let filter =
-            |table: &Arc<TextureTable>| if level > 0.0 { Arc::new(table.filtered(level)) } else { table.clone() };
-        Self { components: [filter(&self.components[0]), filter(&self.components[1])] }
+        if level <= 0.0 || level.is_nan() {
+            return self.clone();
+        }
+        Self { components: self.components.each_ref().map(|table| Arc::new(table.filtered(level))) }
     }
 
     /// The field after `scroll` sheet heights.
@@ -80,8 +81,8 @@ impl Displacement {
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> [Lanes<S>; 2] {
         let [coarse, fine] = &self.layers;
-        let component = |table: &TextureTable| coarse.sample(table, u, w) + fine.sample(table, u, w);
-        [component(&self.components[0]), component(&self.components[1])]
+        let [across, up] = &self.components;
+        [coarse.sample(across, u, w) + fine.sample(across, u, w), coarse.sample(up, u, w) + fine.sample(up, u, w)]
     }
 }
 

@@ -85,9 +85,11 @@ pub(crate) struct PlumeTables {
 impl PlumeTables {
     pub(crate) fn new(plume: &SootFieldParameters, color: &ColorParameters) -> Self {
         let depth = plume.optical_depth.max(f64::MIN_POSITIVE);
-        let axis = |height: f64| [1.0 / half_width(plume, height), axis_optical_depth(plume, height) / depth];
         Self {
-            axis: CurvePair::new(|fraction| axis(fraction * MAX_HEIGHT)),
+            axis: CurvePair::new(|fraction| {
+                let height = fraction * MAX_HEIGHT;
+                [1.0 / half_width(plume, height), axis_optical_depth(plume, height) / depth]
+            }),
             axis_excess: CurvePair::new(|fraction| [axis_excess(plume, fraction * MAX_HEIGHT), 0.0]),
             section: CurvePair::new(|fraction| {
                 [profile(fraction * MAX_ACROSS), excess_profile(plume, fraction * MAX_ACROSS)]

@@ -62,8 +62,11 @@ fn unscaled_color(color: &ColorParameters, t2: f64) -> [f64; 3] {
 
 /// The factor that gives the brightest color luminance 1.
 fn luminance_scale(color: &ColorParameters) -> f64 {
-    let luminance = |rgb: [f64; 3]| f64::from(color::luminance(rgb.map(|value| value as f32)));
-    let max_luminance = (0..=256).map(|i| luminance(unscaled_color(color, f64::from(i) / 256.0))).fold(0.0, f64::max);
+    let mut max_luminance = 0.0_f64;
+    for i in 0..=256 {
+        let rgb = unscaled_color(color, f64::from(i) / 256.0).map(|value| value as f32);
+        max_luminance = max_luminance.max(f64::from(color::luminance(rgb)));
+    }
     if max_luminance > 0.0 { 1.0 / max_luminance } else { 0.0 }
 }
 
@@ -73,11 +76,6 @@ impl ColorParameters {
         let scale = luminance_scale(self);
         move |t2| unscaled_color(self, t2).map(|value| value * scale)
     }
-}
-
-/// Gray value of a stage before coloring.
-fn stage_value(stage: SheetStage, t1: f64, t2: f64) -> f64 {
-    if stage == SheetStage::Sharpened { t2 } else { t1 }
 }
 
 impl ColorRamp {
@@ -93,35 +91,25 @@ impl ColorRamp {
     pub(crate) fn new(texture: &TextureParameters, color: &ColorParameters, stage: SheetStage) -> Self {
         let sharpen = from_origin(&texture.sharpen, "texture.sharpen").unwrap_or_else(|_| texture.sharpen.clone());
         let scale = luminance_scale(color);
-        let light = |t1: f64| {
+        let mut light = Box::new([[0.0; 4]; ENTRIES]);
+        for (i, entry) in light.iter_mut().enumerate() {
+            let t1 = i as f64 / (ENTRIES - 1) as f64;
             let t2 = sharpen.eval(t1);
-            match stage {
-                SheetStage::Flame => {
-                    let [r, g, b] = unscaled_color(color, t2).map(|value| value * scale);
-                    [r, g, b, opacity(color, t2)]
-                }
-                SheetStage::Colored => {
-                    let [r, g, b] = unscaled_color(color, t2).map(|value| value * scale);
-                    [r, g, b, 1.0]
-                }
-                _ => [stage_value(stage, t1, t2), stage_value(stage, t1, t2), stage_value(stage, t1, t2), 1.0],
-            }
-        };
+            let [r, g, b] = match stage {
+                SheetStage::Flame | SheetStage::Colored => unscaled_color(color, t2).map(|value| value * scale),
+                SheetStage::Sharpened => [t2; 3],
+                SheetStage::FlameTexture | SheetStage::Thresholded => [t1; 3],
+            };
+            let opacity = if stage == SheetStage::Flame { opacity(color, t2) } else { 1.0 };
+            *entry = [r, g, b, opacity].map(|value| value as f32);
+        }
         Self {
-            light: tabulate(light),
+            light,
             temperature: CurvePair::new(|t1| [temperature(color, sharpen.eval(t1)), 0.0]),
             absorbs: color.soot_optical_depth > 0.0 || stage != SheetStage::Flame,
             base_blue: chemiluminescence_color().map(|value| value * color.base_blue as f32),
         }
     }
-}
-
-fn tabulate(light: impl Fn(f64) -> [f64; 4]) -> Box<[[f32; 4]; ENTRIES]> {
-    let mut entries = Box::new([[0.0; 4]; ENTRIES]);
-    for (i, entry) in entries.iter_mut().enumerate() {
-        *entry = light(i as f64 / (ENTRIES - 1) as f64).map(|value| value as f32);
-    }
-    entries
 }
 
 impl ColorRamp {

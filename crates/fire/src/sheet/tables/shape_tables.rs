@@ -107,21 +107,20 @@ impl<S: Simd> FlameCoordinates<S> {
     /// Maximum number of texels between neighboring pixels of the row where there may be flame; `texels` are the texels per unit of u and of w.
     #[inline(always)]
     pub(crate) fn max_texel_step(&self, texels: [f32; 2]) -> f32 {
-        let step = |values: Lanes<S>| {
-            let mut row = [values[LANES - 1]; LANES + 1];
-            values.store_slice(&mut row[..LANES]);
-            (Lanes::from_slice(values.simd, &row[1..]) - values).simd_abs()
-        };
         let (one, zero) = (self.w.broadcast(1.0), self.w.broadcast(0.0));
         let inside = (self.edge_distance_pixels + one)
             .simd_min(self.base_distance_pixels + one)
             .simd_min(one - self.w)
             .simd_min(one - self.threshold);
-        let across = step(self.u) * self.u.broadcast(texels[0]);
-        let texel_steps = zero.select_lt(inside, step(self.w).fma(self.u.broadcast(texels[1]), across), zero);
-        let mut each = [0.0; LANES];
-        texel_steps.store_slice(&mut each);
-        each.into_iter().fold(0.0, f32::max)
+        let across = step_to_next(self.u) * self.u.broadcast(texels[0]);
+        let both = step_to_next(self.w).fma(self.u.broadcast(texels[1]), across);
+        let mut texel_steps = [0.0; LANES];
+        zero.select_lt(inside, both, zero).store_slice(&mut texel_steps);
+        let mut max_step = 0.0_f32;
+        for step in texel_steps {
+            max_step = max_step.max(step);
+        }
+        max_step
     }
 
     /// `self + fraction * delta`.
@@ -148,6 +147,14 @@ impl<S: Simd> FlameCoordinates<S> {
             base_distance_pixels: combine(self.base_distance_pixels, other.base_distance_pixels),
         }
     }
+}
+
+/// Distance of each value from the next of its row; 0 for the last.
+#[inline(always)]
+fn step_to_next<S: Simd>(values: Lanes<S>) -> Lanes<S> {
+    let mut row = [values[LANES - 1]; LANES + 1];
+    values.store_slice(&mut row[..LANES]);
+    (Lanes::from_slice(values.simd, &row[1..]) - values).simd_abs()
 }
 
 impl ShapeTables {
@@ -260,10 +267,7 @@ impl ShapeTables {
     /// Whether a region contains no point of the flame, determined from six points on its border; x is relative to the center line.
     #[inline(always)]
     pub(crate) fn misses_flame(&self, x: &[f32; 6], y: &[f32; 6]) -> bool {
-        let range = |values: &[f32; 6]| {
-            values[1..].iter().fold([values[0]; 2], |[low, high], value| [value.simd_min(low), value.simd_max(high)])
-        };
-        let ([left, right], [low, high]) = (range(x), range(y));
+        let ([left, right], [low, high]) = (min_max(x), min_max(y));
         if !(high > -0.1 && low < 1.1) {
             return true;
         }
@@ -272,8 +276,12 @@ impl ShapeTables {
         } else {
             equations::axis_distance(left).simd_min(equations::axis_distance(right))
         };
-        let bin = |y: f32| (y.simd_clamp01() * (EXTENT_BINS - 1) as f32) as i32 as usize & (EXTENT_BINS - 1);
-        !self.max_distance[bin(low)..bin(high) + 1].iter().any(|max_distance| nearest <= *max_distance)
+        for max_distance in &self.max_distance[extent_bin(low)..extent_bin(high) + 1] {
+            if nearest <= *max_distance {
+                return false;
+            }
+        }
+        true
     }
 
     /// For each bin of height the largest x' with w <= 1 inside the fringe, with a margin for antialiasing.
@@ -308,6 +316,22 @@ impl ShapeTables {
         }
         widest
     }
+}
+
+/// Minimum and maximum of the coordinates of six points; NaN is ignored unless it is the first.
+#[inline(always)]
+fn min_max(values: &[f32; 6]) -> [f32; 2] {
+    let [mut low, mut high] = [values[0]; 2];
+    for value in &values[1..] {
+        (low, high) = (value.simd_min(low), value.simd_max(high));
+    }
+    [low, high]
+}
+
+/// The bin of [`ShapeTables::max_distance`] for a height. The mask saves the bounds check.
+#[inline(always)]
+fn extent_bin(y: f32) -> usize {
+    (y.simd_clamp01() * (EXTENT_BINS - 1) as f32) as i32 as usize & (EXTENT_BINS - 1)
 }
 
 /// Factor of red light at height w, and that of green relative to red, where soot has cooled by the fraction `cooling * w`.

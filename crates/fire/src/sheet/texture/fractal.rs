@@ -29,33 +29,51 @@ type Texels = Vec<f32>;
 
 /// Periodic gradient noise (Perlin 1985, with the quintic fade of 2002) on a lattice that divides the table.
 fn gradient_noise(cells: [usize; 2], key: Key, purpose: Purpose) -> Texels {
-    let gradients: Vec<[f32; 2]> = (0..cells[0] * cells[1])
-        .map(|cell| {
-            let turn = key.uniforms(cell as u64, 0, purpose)[0];
-            let (sin, cos) = math::f32::sin_cos(std::f32::consts::TAU * turn);
-            [cos, sin]
-        })
-        .collect();
+    let lattice = GradientLattice::new(cells, key, purpose);
     let (across, up) = (lattice_coordinates(COLUMNS, cells[0]), lattice_coordinates(ROWS, cells[1]));
     let mut texels = Vec::with_capacity(ROWS * COLUMNS);
     for y in &up {
         for x in &across {
-            let dot = |column: usize, row: usize, offset: [f32; 2]| {
-                let gradient = gradients[row * cells[0] + column];
-                gradient[0] * offset[0] + gradient[1] * offset[1]
-            };
             let (fx, fy) = (x.fraction, y.fraction);
-            let below =
-                math::f32::lerp(dot(x.cell, y.cell, [fx, fy]), dot(x.next_cell, y.cell, [fx - 1.0, fy]), x.fade);
+            let below = math::f32::lerp(
+                lattice.dot(x.cell, y.cell, [fx, fy]),
+                lattice.dot(x.next_cell, y.cell, [fx - 1.0, fy]),
+                x.fade,
+            );
             let above = math::f32::lerp(
-                dot(x.cell, y.next_cell, [fx, fy - 1.0]),
-                dot(x.next_cell, y.next_cell, [fx - 1.0, fy - 1.0]),
+                lattice.dot(x.cell, y.next_cell, [fx, fy - 1.0]),
+                lattice.dot(x.next_cell, y.next_cell, [fx - 1.0, fy - 1.0]),
                 x.fade,
             );
             texels.push(math::f32::lerp(below, above, y.fade));
         }
     }
     texels
+}
+
+/// Random unit vectors at the nodes of a periodic lattice.
+struct GradientLattice {
+    columns: usize,
+    /// Row by row.
+    gradients: Vec<[f32; 2]>,
+}
+
+impl GradientLattice {
+    fn new([columns, rows]: [usize; 2], key: Key, purpose: Purpose) -> Self {
+        let mut gradients = Vec::with_capacity(columns * rows);
+        for node in 0..columns * rows {
+            let turn = key.uniforms(node as u64, 0, purpose)[0];
+            let (sin, cos) = math::f32::sin_cos(std::f32::consts::TAU * turn);
+            gradients.push([cos, sin]);
+        }
+        Self { columns, gradients }
+    }
+
+    /// Dot product of the gradient of a node and the offset from it.
+    fn dot(&self, column: usize, row: usize, offset: [f32; 2]) -> f32 {
+        let gradient = self.gradients[row * self.columns + column];
+        gradient[0] * offset[0] + gradient[1] * offset[1]
+    }
 }
 
 /// Position of a texel on a periodic lattice along one axis.
@@ -152,6 +170,35 @@ struct LayerMapping {
     start: [f64; 2],
 }
 
+impl LayerMapping {
+    /// The mapping for tongues `width` times as wide and `length` times as long, which rise at `speed` times the scroll speed and repeat with the loop.
+    fn fitted(self, [width, length]: [f64; 2], speed: f64, clock: &Clock) -> Self {
+        let heights = self.heights / length;
+        // The number of tables that pass in a loop is rounded to an integer: by a stretch of at most 25 %, and beyond that by the speed.
+        let layer_speed = self.rate * speed.max(1e-3);
+        let rounding = clock.waves(heights * layer_speed, 1.0) / (heights * layer_speed);
+        let stretch = rounding.clamp(0.8, 1.25);
+        let rate = layer_speed * rounding / stretch;
+        let slant = clock.waves(self.slant * rate, 0.0) / rate;
+        Self { widths: self.widths / width, slant, heights: heights * stretch, rate, ..self }
+    }
+
+    /// The mapping in texels after `scroll` sheet heights.
+    fn after(self, scroll: f64) -> TextureLayer {
+        let layer_scroll = self.rate * scroll;
+        let column = math::reduce_phase(self.start[0] - self.slant * layer_scroll);
+        let row = math::reduce_phase(self.start[1] - self.heights * layer_scroll);
+        let (columns, rows) = (COLUMNS as f64, ROWS as f64);
+        TextureLayer {
+            columns_per_u: (columns * self.widths) as f32,
+            columns_per_w: (columns * self.slant) as f32,
+            first_column: columns as f32 * column,
+            rows_per_w: (rows * self.heights) as f32,
+            first_row: rows as f32 * row,
+        }
+    }
+}
+
 /// The layers of one flame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FractalLayers {
@@ -175,17 +222,7 @@ impl FractalLayers {
         };
         let fine =
             LayerMapping { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
-        let fit = |mapping: LayerMapping| {
-            let heights = mapping.heights / length;
-            // The number of tables that pass in a loop is rounded to an integer: by a stretch of at most 25 %, and beyond that by the speed.
-            let layer_speed = mapping.rate * speed.max(1e-3);
-            let rounding = clock.waves(heights * layer_speed, 1.0) / (heights * layer_speed);
-            let stretch = rounding.clamp(0.8, 1.25);
-            let rate = layer_speed * rounding / stretch;
-            let slant = clock.waves(mapping.slant * rate, 0.0) / rate;
-            LayerMapping { widths: mapping.widths / width, slant, heights: heights * stretch, rate, ..mapping }
-        };
-        Self { mappings: [fit(coarse), fit(fine)] }
+        Self { mappings: [coarse, fine].map(|mapping| mapping.fitted([width, length], speed, clock)) }
     }
 
     /// The texture after `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
@@ -195,20 +232,7 @@ impl FractalLayers {
 
     /// The mappings of both layers to their table after `scroll` sheet heights.
     pub(crate) fn layers(&self, scroll: f64) -> [TextureLayer; 2] {
-        let layer = |mapping: &LayerMapping| {
-            let scroll = mapping.rate * scroll;
-            let column = math::reduce_phase(mapping.start[0] - mapping.slant * scroll);
-            let row = math::reduce_phase(mapping.start[1] - mapping.heights * scroll);
-            let (columns, rows) = (COLUMNS as f64, ROWS as f64);
-            TextureLayer {
-                columns_per_u: (columns * mapping.widths) as f32,
-                columns_per_w: (columns * mapping.slant) as f32,
-                first_column: columns as f32 * column,
-                rows_per_w: (rows * mapping.heights) as f32,
-                first_row: rows as f32 * row,
-            }
-        };
-        [layer(&self.mappings[0]), layer(&self.mappings[1])]
+        self.mappings.map(|mapping| mapping.after(scroll))
     }
 
     /// Texels per sheet height, of the finer layer.

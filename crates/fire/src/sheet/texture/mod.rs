@@ -5,7 +5,7 @@ mod paper;
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, OnceLock, PoisonError, Weak},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak},
 };
 
 use bansho_base::math::{
@@ -38,12 +38,14 @@ pub(crate) struct TextureTable {
 impl TextureTable {
     /// A table of the texels `texels[row * COLUMNS + column]`.
     pub(crate) fn new(texels: &[f32]) -> Self {
-        let at = |row: usize, column: usize| texels[(row % ROWS) * COLUMNS + column % COLUMNS];
-        let corner = |i: usize| {
-            let (row, column) = (i / COLUMNS, i % COLUMNS);
-            [at(row, column), at(row, column + 1), at(row + 1, column), at(row + 1, column + 1)]
-        };
-        let corners: Vec<[f32; 4]> = (0..ROWS * COLUMNS).map(corner).collect();
+        let mut corners = Vec::with_capacity(ROWS * COLUMNS);
+        for row in 0..ROWS {
+            let (lower, upper) = (wrapped_row(texels, row), wrapped_row(texels, row + 1));
+            for column in 0..COLUMNS {
+                let next = (column + 1) % COLUMNS;
+                corners.push([lower[column], lower[next], upper[column], upper[next]]);
+            }
+        }
         // The conversion never fails: the range has exactly the array's length.
         let corners = corners.into_boxed_slice().try_into().unwrap_or_else(|_| Box::new([[0.0; 4]; ROWS * COLUMNS]));
         Self { corners, coarser: Default::default() }
@@ -68,8 +70,9 @@ impl TextureTable {
 
     /// One bilinear lookup at wrapped coordinates of at least -2^16 texels.
     fn bilinear(&self, column: f32, row: f32) -> f32 {
-        let split = |coordinate: f32| (coordinate.floor() as i32 as usize, coordinate - coordinate.floor());
-        let ((left, across), (below, up)) = (split(column), split(row));
+        // The sides are powers of two: also a negative column or row, which becomes a large number, wraps.
+        let (left, below) = (column.floor() as i32 as usize, row.floor() as i32 as usize);
+        let (across, up) = (column - column.floor(), row - row.floor());
         let [low_left, low_right, high_left, high_right] = self.corners[below % ROWS * COLUMNS + left % COLUMNS];
         let low = (low_right - low_left).fma(across, low_left);
         let high = (high_right - high_left).fma(across, high_left);
@@ -119,10 +122,16 @@ fn filter_rows(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) 
 
 #[inline(always)]
 fn filter_columns(before: &[f32], texels: &mut [f32], spacing: usize, amount: f32) {
-    let row = |row: usize| &before[row % ROWS * COLUMNS..][..COLUMNS];
-    for (index, filtered) in texels.chunks_exact_mut(COLUMNS).enumerate() {
-        blend(row(index), [row(index + spacing), row(index + ROWS - spacing)], amount, filtered);
+    for (row, filtered) in texels.chunks_exact_mut(COLUMNS).enumerate() {
+        let neighbors = [wrapped_row(before, row + spacing), wrapped_row(before, row + ROWS - spacing)];
+        blend(wrapped_row(before, row), neighbors, amount, filtered);
     }
+}
+
+/// A row of the texels of a table, which repeats after [`ROWS`] rows.
+#[inline(always)]
+fn wrapped_row(texels: &[f32], row: usize) -> &[f32] {
+    &texels[row % ROWS * COLUMNS..][..COLUMNS]
 }
 
 /// Blends a row by `amount` with the binomial mean of itself and the rows, or shifted copies, on both sides.
@@ -262,18 +271,19 @@ impl FilterCache {
     }
 
     fn filtered_fractal(&self, level: f32) -> Arc<TextureTable> {
-        let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = recent().iter().find(|(known, _)| *known == level).map(|(_, table)| table.clone());
-        known.unwrap_or_else(|| {
-            // Computed without the lock, so that no thread waits.
-            let table = shared_filtered_fractal(level);
-            let mut recent = recent();
-            while recent.len() >= self.capacity.max(1) {
-                recent.remove(0);
-            }
-            recent.push((level, table.clone()));
-            table
-        })
+        let cached_table =
+            lock(&self.recent).iter().find(|(of_level, _)| *of_level == level).map(|(_, table)| table.clone());
+        if let Some(table) = cached_table {
+            return table;
+        }
+        // Computed without the lock, so that no thread waits.
+        let table = shared_filtered_fractal(level);
+        let mut recent = lock(&self.recent);
+        while recent.len() >= self.capacity.max(1) {
+            recent.remove(0);
+        }
+        recent.push((level, table.clone()));
+        table
     }
 }
 
@@ -283,17 +293,22 @@ pub(crate) const TABLE_BYTES: f64 = (ROWS * COLUMNS * size_of::<[f32; 4]>()) as 
 /// The fractal table at a level, which all sheets of the process share while any of them holds it: a scene may have hundreds of equal flames.
 fn shared_filtered_fractal(level: f32) -> Arc<TextureTable> {
     static SHARED: Mutex<BTreeMap<u32, Weak<TextureTable>>> = Mutex::new(BTreeMap::new());
-    let shared = || SHARED.lock().unwrap_or_else(PoisonError::into_inner);
     let key = level.clamp(0.0, MAX_LEVEL as f32).to_bits();
-    let known = shared().get(&key).and_then(Weak::upgrade);
-    known.unwrap_or_else(|| {
-        // Computed without the lock: two threads may compute the same table.
-        let table = Arc::new(FRACTAL.filtered(level));
-        let mut shared = shared();
-        shared.retain(|_, table| table.strong_count() > 0);
-        shared.insert(key, Arc::downgrade(&table));
-        table
-    })
+    let table_in_use = lock(&SHARED).get(&key).and_then(Weak::upgrade);
+    if let Some(table) = table_in_use {
+        return table;
+    }
+    // Computed without the lock: two threads may compute the same table.
+    let table = Arc::new(FRACTAL.filtered(level));
+    let mut shared = lock(&SHARED);
+    shared.retain(|_, table| table.strong_count() > 0);
+    shared.insert(key, Arc::downgrade(&table));
+    table
+}
+
+/// Locks a cache, also after a panic of another thread: every change leaves it valid.
+fn lock<T>(cache: &Mutex<T>) -> MutexGuard<'_, T> {
+    cache.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Clone for FilterCache {

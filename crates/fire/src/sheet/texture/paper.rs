@@ -48,11 +48,13 @@ struct Octave {
 impl Octave {
     fn all(octaves: u32) -> impl Iterator<Item = Self> {
         let first = Self { across: FIRST_FREQUENCY_P, up: FIRST_FREQUENCY_Q, weight: 1.0 };
-        let next = |octave: &Self| {
-            let weight = octave.weight * AMPLITUDE_RATIO * AMPLITUDE_RATIO;
-            Some(Self { across: 2.0 * octave.across, up: 2.0 * octave.up, weight })
-        };
-        std::iter::successors(Some(first), next).take(octaves as usize)
+        std::iter::successors(Some(first), |octave| Some(octave.next())).take(octaves as usize)
+    }
+
+    /// The octave of twice the frequency.
+    fn next(&self) -> Self {
+        let weight = self.weight * AMPLITUDE_RATIO * AMPLITUDE_RATIO;
+        Self { across: 2.0 * self.across, up: 2.0 * self.up, weight }
     }
 
     /// The four functions of one coordinate whose products with those of the other sum to a term.
@@ -80,22 +82,26 @@ impl PaperTexture {
     pub fn new(p: &[f64], q: &[f64], octaves: u32) -> Self {
         let terms: Vec<Octave> = Octave::all(octaves).collect();
         let total: f64 = terms.iter().map(|octave| octave.weight).sum();
-        let column_factors = |octave: &Octave| {
+        let mut across = Vec::with_capacity(4 * terms.len());
+        for octave in &terms {
             let factors: Vec<[f64; 4]> = p.iter().map(|p| Octave::factors(*p, octave.across)).collect();
             // cos a cos d, cos a sin d, sin a cos d, sin a sin d are multiplied by cos b cos c, cos b sin c, sin b cos c, sin b sin c.
             let scale = 0.5 * octave.weight / total;
-            [0, 1, 2, 3].map(|k| {
-                let sign = if k == 0 || k == 3 { scale } else { -scale };
-                factors.iter().map(|factor| (sign * factor[k]) as f32).collect::<Vec<f32>>()
-            })
-        };
-        let row_factors = |q: &f64| {
-            // Here the coordinate term is c = Fy y and the phase term b = Px(y): reorder [cc cb, cc sb, sc cb, sc sb] to match the columns.
-            let reorder =
-                |[cc_cb, cc_sb, sc_cb, sc_sb]: [f64; 4]| [cc_cb, sc_cb, cc_sb, sc_sb].map(|value| value as f32);
-            terms.iter().flat_map(|octave| reorder(Octave::factors(*q, octave.up))).collect()
-        };
-        Self { across: terms.iter().flat_map(column_factors).collect(), up: q.iter().map(row_factors).collect() }
+            for (k, signed_scale) in [scale, -scale, -scale, scale].into_iter().enumerate() {
+                across.push(factors.iter().map(|factor| (signed_scale * factor[k]) as f32).collect());
+            }
+        }
+        let mut up = Vec::with_capacity(q.len());
+        for q in q {
+            let mut row = Vec::with_capacity(4 * terms.len());
+            for octave in &terms {
+                // Here the coordinate term is c = Fy y and the phase term b = Px(y): reorder [cc cb, cc sb, sc cb, sc sb] to match the columns.
+                let [cc_cb, cc_sb, sc_cb, sc_sb] = Octave::factors(*q, octave.up).map(|value| value as f32);
+                row.extend([cc_cb, sc_cb, cc_sb, sc_sb]);
+            }
+            up.push(row);
+        }
+        Self { across, up }
     }
 
     /// Writes row `row` for all columns; values in [0, 1].

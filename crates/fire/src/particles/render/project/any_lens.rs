@@ -28,10 +28,14 @@ impl AnyLensProjector<'_> {
         let position = gas.position(index, view.shutter.middle());
         let camera = &view.camera;
         let Some(projection) = project(camera, position) else { return };
-        let at = |camera: &Camera, t: f64| project(camera, gas.position(index, t));
-        let motion = motion(camera, Some(projection), at(&view.next, view.next_middle));
+        let next = project(&view.next, gas.position(index, view.next_middle));
+        let motion = motion(camera, Some(projection), next);
         let blur = match &view.ends {
-            Some([open, close]) => self::motion(camera, at(open, view.shutter.open), at(close, view.shutter.close)),
+            Some([open, close]) => {
+                let opened = project(open, gas.position(index, view.shutter.open));
+                let closed = project(close, gas.position(index, view.shutter.close));
+                self::motion(camera, opened, closed)
+            }
             None => motion * view.shutter_fraction(),
         };
         let sprite = match self.cap(gas, index, position, &projection, blur) {
@@ -234,7 +238,6 @@ fn outer(v: DVec2) -> DMat2 {
 /// Jacobian of the projection: pixels to the right and down per meter across the line of sight. In closed form for a perspective lens, by finite
 /// differences for others.
 fn lens_jacobian(camera: &Camera, position: DVec3, projection: &Projection) -> DMat2 {
-    let isotropic = DMat2::from_diagonal(DVec2::splat(projection.pixels_per_meter));
     if camera.lens == Lens::Perspective {
         // Along the line to the optical axis the plane is oblique to the ray: 1 / cos a.
         let slope = (projection.pixel - camera.principal_point) / camera.focal_pixels;
@@ -245,12 +248,11 @@ fn lens_jacobian(camera: &Camera, position: DVec3, projection: &Projection) -> D
     let ray = (position - camera.position).normalize_or(DVec3::Z);
     let (one, two) = ray.any_orthonormal_pair();
     let step = 1e-4 * projection.depth;
-    let derivative = |direction: DVec3| {
-        let moved = project(camera, position + direction * step)?;
-        Some((camera.nearest_repetition(moved.pixel, projection.pixel) - projection.pixel) / step)
+    let moved = [one, two].map(|direction| project(camera, position + direction * step));
+    let [Some(moved_one), Some(moved_two)] = moved else {
+        return DMat2::from_diagonal(DVec2::splat(projection.pixels_per_meter));
     };
-    match (derivative(one), derivative(two)) {
-        (Some(one), Some(two)) => DMat2::from_cols(one, two),
-        _ => isotropic,
-    }
+    let [one, two] = [moved_one, moved_two]
+        .map(|moved| (camera.nearest_repetition(moved.pixel, projection.pixel) - projection.pixel) / step);
+    DMat2::from_cols(one, two)
 }

@@ -46,7 +46,8 @@ pub(crate) fn project_particles<'a, K: SpriteKind>(
     let projector = AnyLensProjector { view };
     let perspective = PerspectiveProjector::new(gas, view);
     let (count, level) = (gas.particles.len(), bansho_base::math::simd::level());
-    let of_task = |task: usize| {
+    let tasks = (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter();
+    let records_of_tasks = tasks.map(|task| {
         let range = task * PARTICLES_PER_TASK..((task + 1) * PARTICLES_PER_TASK).min(count);
         let mut records = gas.buffers.take(PARTICLES_PER_TASK);
         records.clear();
@@ -61,8 +62,8 @@ pub(crate) fn project_particles<'a, K: SpriteKind>(
             }
         }
         records
-    };
-    (0..count.div_ceil(PARTICLES_PER_TASK)).into_par_iter().map(of_task).collect()
+    });
+    records_of_tasks.collect()
 }
 
 #[cfg(test)]

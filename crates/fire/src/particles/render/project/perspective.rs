@@ -3,10 +3,7 @@
 
 use bansho_base::{
     camera::{Camera, Lens},
-    math::{
-        DVec3,
-        simd::{LANES, LaneArray},
-    },
+    math::simd::{LANES, LaneArray},
 };
 
 use super::{PIXEL_FOOTPRINT, ProjectedParticle, SpriteKind};
@@ -44,14 +41,16 @@ struct ProjectedBatch {
 impl PerspectiveProjector {
     /// The projector of a view; `None` unless the lens is a perspective lens.
     pub(super) fn new(gas: &Gas, view: &GasView) -> Option<Self> {
-        let pinhole = |camera, t| PinholeCamera::new(camera, gas.particles.origin, t - gas.time);
-        (view.camera.lens == Lens::Perspective).then(|| Self {
-            now: pinhole(&view.camera, view.shutter.middle()),
-            next: pinhole(&view.next, view.next_middle),
-            ends: view
-                .ends
-                .as_ref()
-                .map(|[open, close]| [pinhole(open, view.shutter.open), pinhole(close, view.shutter.close)]),
+        if view.camera.lens != Lens::Perspective {
+            return None;
+        }
+        let ends = view.ends.as_ref().map(|[open, close]| {
+            [PinholeCamera::new(open, gas, view.shutter.open), PinholeCamera::new(close, gas, view.shutter.close)]
+        });
+        Some(Self {
+            now: PinholeCamera::new(&view.camera, gas, view.shutter.middle()),
+            next: PinholeCamera::new(&view.next, gas, view.next_middle),
+            ends,
             shutter_fraction: view.shutter_fraction() as f32,
             size: view.camera.size.map(|side| side as f32),
             max_pixel_coordinate: view.max_pixel_coordinate() as f32,
@@ -204,15 +203,15 @@ struct PinholeCamera {
 }
 
 impl PinholeCamera {
-    fn new(camera: &Camera, origin: DVec3, seconds_since_state: f64) -> Self {
-        let axis = |i: usize| camera.world_from_camera.col(i).as_vec3().to_array();
+    /// A camera that shows the gas as it is at `t`.
+    fn new(camera: &Camera, gas: &Gas, t: f64) -> Self {
         Self {
-            axes: [axis(0), axis(1), axis(2)],
-            origin: camera.point_in_camera(origin).as_vec3().to_array(),
+            axes: [0, 1, 2].map(|axis| camera.world_from_camera.col(axis).as_vec3().to_array()),
+            origin: camera.point_in_camera(gas.particles.origin).as_vec3().to_array(),
             focal_pixels: camera.focal_pixels as f32,
             center: camera.principal_point.as_vec2().to_array(),
             near: camera.near as f32,
-            seconds_since_state: seconds_since_state as f32,
+            seconds_since_state: (t - gas.time) as f32,
         }
     }
 

@@ -105,9 +105,8 @@ impl GasResolver<'_> {
         let (cells, depth) = (&self.grid.cells, self.grid.depth);
         let (cell, phase) = cells.cell_before(1, y);
         let [first, last] = extents.around(layer, cell)?;
-        let pixel = |column: i64| ((column + i64::from(cells.first[0])) * cells.size as i64).max(0) as usize;
         // Support of cubic interpolation.
-        let pixels = [pixel(i64::from(first) - 2), pixel(i64::from(last) + 3)];
+        let pixels = [cells.left_of_column(i64::from(first) - 2), cells.left_of_column(i64::from(last) + 3)];
         // Whole batches of sixteen pixels are filled, since remains of earlier rows would depend on where a strip starts.
         let [begin, end] = [pixels[0] / LANES * LANES, pixels[1].next_multiple_of(LANES)];
         let from = self.grid.first_of_four(cells.cell_before(0, begin).0);
@@ -198,11 +197,9 @@ impl GasResolver<'_> {
         layer: &DepthLayer,
         [x, y]: [usize; 2],
     ) -> Option<[LaneArray; 3]> {
-        let at = |column: f64| {
-            let direction = self.camera.direction(DVec2::new(column, y as f64 + 0.5))?;
-            Some((self.camera.position + direction * layer.depth - self.origin).as_vec3().to_array())
-        };
-        let (first, last) = (at(x as f64 + 0.5), at((x + LANES) as f64 - 0.5));
+        // Exact at the first and the last pixel, and linear between.
+        let first = self.position_in_layer(layer, x as f64 + 0.5, y as f64 + 0.5);
+        let last = self.position_in_layer(layer, (x + LANES) as f64 - 0.5, y as f64 + 0.5);
         let (first, last) = (first.or(last)?, last.or(first)?);
         let mut noise_positions =
             self.planes(row, layer.index, x, [DETAIL_OFFSET, DETAIL_OFFSET + 1, DETAIL_OFFSET + 2]);
@@ -215,6 +212,13 @@ impl GasResolver<'_> {
             }
         }
         Some(noise_positions)
+    }
+
+    /// Position of a layer at a point of the picture, m from the origin of detail coordinates; `None` where the lens shows nothing.
+    #[inline(always)]
+    fn position_in_layer(&self, layer: &DepthLayer, px: f64, py: f64) -> Option<[f32; 3]> {
+        let direction = self.camera.direction(DVec2::new(px, py))?;
+        Some((self.camera.position + direction * layer.depth - self.origin).as_vec3().to_array())
     }
 
     /// Composites a layer behind the contents of `rect` of a strip.
@@ -385,18 +389,19 @@ pub(crate) struct ColumnExtents {
 impl ColumnExtents {
     pub(crate) fn new(grid: &Grid, layers: usize) -> Self {
         use bansho_base::host::parallel::prelude::*;
-        let columns = grid.cells.columns;
-        let extent = |index: usize| {
-            let (row, layer) = (index / layers, index % layers);
-            let cells = grid.row(row as i32);
-            let value = |column: usize, plane: usize| cells[column * grid.depth + layer * PLANES + plane];
-            let is_occupied = |column: &usize| value(*column, TAU) > 0.0 || value(*column, BLUE) > 0.0;
-            let first = (0..columns).find(is_occupied);
-            let last = (0..columns).rfind(is_occupied);
-            first.zip(last).map_or([u32::MAX, 0], |(first, last)| [first as u32, last as u32])
-        };
-        let rows = (0..grid.cells.rows * layers).into_par_iter().with_min_len(64).map(extent).collect();
-        Self { layers, rows }
+        let indices = (0..grid.cells.rows * layers).into_par_iter().with_min_len(64);
+        let rows = indices.map(|index| Self::of_row(grid.row((index / layers) as i32), grid.depth, index % layers));
+        Self { layers, rows: rows.collect() }
+    }
+
+    /// First and last column of a row of cells, of `depth` values each, where a layer absorbs or emits; the first after the last if there is none.
+    fn of_row(cells: &[f32], depth: usize, layer: usize) -> [u32; 2] {
+        let start = layer * PLANES;
+        let mut occupied =
+            cells.chunks_exact(depth).map(|values| values[start + TAU] > 0.0 || values[start + BLUE] > 0.0);
+        let first = occupied.clone().position(|is_occupied| is_occupied);
+        let last = occupied.rposition(|is_occupied| is_occupied);
+        first.zip(last).map_or([u32::MAX, 0], |(first, last)| [first as u32, last as u32])
     }
 
     /// First and last occupied column of a row of cells.

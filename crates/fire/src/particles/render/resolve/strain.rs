@@ -40,10 +40,15 @@ impl Strain {
                 let range = first.max(1) as usize..(last as usize + 1).min(columns - 1);
                 dispatch!(level, _simd => {
                     for column in range {
-                        let at = |row: usize, column: usize| DetailCoordinates::from_sums(&rows[row][column * grid.depth + layer * PLANES..]);
-                        let own = at(1, column);
+                        let start = column * grid.depth + layer * PLANES;
+                        let own = DetailCoordinates::from_sums(&rows[1][start..]);
                         if own.tau > MIN_DEPTH {
-                            let neighbors = [at(0, column), at(2, column), at(1, column - 1), at(1, column + 1)];
+                            let neighbors = [
+                                DetailCoordinates::from_sums(&rows[0][start..]),
+                                DetailCoordinates::from_sums(&rows[2][start..]),
+                                DetailCoordinates::from_sums(&rows[1][start - grid.depth..]),
+                                DetailCoordinates::from_sums(&rows[1][start + grid.depth..]),
+                            ];
                             out[column] = scale * own.max_distance(&neighbors);
                         }
                     }
@@ -83,7 +88,11 @@ impl DetailCoordinates {
     fn from_sums(sums: &[f32]) -> Self {
         let tau = sums[TAU];
         let inverse_depth = 1.0 / tau.max(MIN_DEPTH);
-        Self { tau, position: [0, 1, 2].map(|axis| sums[DETAIL_OFFSET + axis] * inverse_depth) }
+        let mut position = [0.0; 3];
+        for axis in 0..3 {
+            position[axis] = sums[DETAIL_OFFSET + axis] * inverse_depth;
+        }
+        Self { tau, position }
     }
 
     /// Maximum distance in the noise to a neighboring cell.

@@ -46,13 +46,14 @@ impl Cap {
 
 /// Unit vectors in world axes toward the centers of all cells, row by row.
 pub(crate) fn directions(camera: &Camera, cells: &Raster) -> Vec<[f32; 3]> {
-    let size = cells.size as f64;
-    let center = |first: i32, index: usize| (f64::from(first) + index as f64 + 0.5) * size;
-    let row = |row: usize| {
-        let y = center(cells.first[1], row);
-        (0..cells.columns).map(move |column| direction(camera, DVec2::new(center(cells.first[0], column), y)))
-    };
-    (0..cells.rows).flat_map(row).map(|direction| direction.as_vec3().to_array()).collect()
+    let mut directions = Vec::with_capacity(cells.rows * cells.columns);
+    for row in 0..cells.rows {
+        for column in 0..cells.columns {
+            let center = DVec2::new(cells.center(0, column), cells.center(1, row));
+            directions.push(direction(camera, center).as_vec3().to_array());
+        }
+    }
+    directions
 }
 
 /// The direction at a position in the picture, also beyond its edges and the circle of a fisheye, where interpolation reads.

@@ -55,6 +55,17 @@ impl Raster {
         Rect { x, y, width: right - x, height: bottom - y }
     }
 
+    /// The first pixel of a column of cells, counted from the first column; 0 for columns beyond the left edge of the picture.
+    #[inline(always)]
+    pub(crate) fn left_of_column(&self, column: i64) -> usize {
+        ((column + i64::from(self.first[0])) * self.size as i64).max(0) as usize
+    }
+
+    /// Center of the cell at an index along an axis, pixels from the picture's corner.
+    pub(crate) fn center(&self, axis: usize, index: usize) -> f64 {
+        (f64::from(self.first[axis]) + index as f64 + 0.5) * self.size as f64
+    }
+
     /// Pixel coordinates in cells; cell centers are integers.
     #[inline(always)]
     pub(crate) fn cell_coordinates(&self, pixel: [f32; 2]) -> [f32; 2] {

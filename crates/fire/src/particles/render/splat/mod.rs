@@ -108,26 +108,23 @@ pub(crate) fn splat<'a, const P: usize>(
     let Some(rect) = statistics.covered(settings.picture) else { return SplatResult::Empty };
     let finest = statistics.finest();
     let nested = statistics.counts.iter().skip(finest + 2).any(|count| *count > 0);
-    let whole_picture_cells = |grid_level| Raster::around(rect, cell_size(grid_level), nested);
-    let drawn = whole_picture_cells(finest).covered().intersection(&settings.window);
+    let drawn = Raster::around(rect, cell_size(finest), nested).covered().intersection(&settings.window);
     if drawn.is_empty() {
         return SplatResult::OutsideWindow;
     }
     let drawn = aligned_to_lanes(drawn);
-    let cells = |grid_level| {
-        Raster::around(drawn, cell_size(grid_level), nested).intersection(&whole_picture_cells(grid_level))
-    };
-    let whole_picture_columns = |grid_level| whole_picture_cells(grid_level).picture_columns();
     let mut coarser: Option<Grid> = None;
     for grid_level in (finest..MAX_LEVEL + 1).step_by(2).rev() {
         let any = statistics.counts[grid_level..].iter().take(2).any(|count| *count > 0);
         if !any && grid_level != finest && coarser.is_none() {
             continue;
         }
-        let mut grid = Grid::new(cells(grid_level), settings.layers * P, buffers);
-        let is_on_this_grid = |radius: f32| settings.grid_level(radius).max(finest).wrapping_sub(grid_level) < 2;
+        let whole_picture_cells = Raster::around(rect, cell_size(grid_level), nested);
+        let cells = Raster::around(drawn, cell_size(grid_level), nested).intersection(&whole_picture_cells);
+        let mut grid = Grid::new(cells, settings.layers * P, buffers);
         let directions = if statistics.has_caps { cap::directions(&settings.camera, &grid.cells) } else { Vec::new() };
-        add_sprites(settings, tasks, is_on_this_grid, whole_picture_columns(grid_level), &directions, &mut grid);
+        let levels = GridLevels { this: grid_level, finest };
+        add_sprites(settings, tasks, levels, whole_picture_cells.picture_columns(), &directions, &mut grid);
         if let Some(coarser) = coarser {
             grid.add_coarser(&coarser);
         }
@@ -147,8 +144,23 @@ fn cell_size(grid_level: usize) -> usize {
     if grid_level.is_multiple_of(2) { 1 << (grid_level / 2) } else { 3 << (grid_level / 2 - 1) }
 }
 
+/// The level of a grid, and that of the finest one, on which smaller sprites are, too.
+#[derive(Clone, Copy, Debug)]
+struct GridLevels {
+    this: usize,
+    finest: usize,
+}
+
 impl SplatSettings {
+    /// Whether a sprite is on a grid: those of two levels, half an octave apart, share one.
+    #[inline(always)]
+    fn is_on_grid(&self, radius: f32, levels: GridLevels) -> bool {
+        // Sprites of finer grids are below this level: the difference wraps.
+        self.grid_level(radius).max(levels.finest).wrapping_sub(levels.this) < 2
+    }
+
     /// The level of the largest cells that are small enough for a sprite.
+    #[inline(always)]
     fn grid_level(&self, radius: f32) -> usize {
         // The exponent of a float counts octaves; its first mantissa bit distinguishes the upper from the lower half of an octave.
         let half_octaves = ((radius / self.min_radius_cells).max(1.0).to_bits() >> 22) as usize - (127 << 1);
@@ -172,19 +184,22 @@ impl SpriteStatistics {
     const EMPTY: Self = Self { low: [f32::MAX; 2], high: [f32::MIN; 2], counts: [0; MAX_LEVEL + 1], has_caps: false };
 
     fn new<const P: usize>(settings: &SplatSettings, tasks: &[PooledVec<Sprite<P>>]) -> Self {
-        let of_task = |task: &PooledVec<Sprite<P>>| {
-            let mut statistics = Self::EMPTY;
-            for Sprite { ellipse, .. } in task.iter() {
-                for axis in 0..2 {
-                    statistics.low[axis] = statistics.low[axis].min(ellipse.center[axis] - ellipse.half_size[axis]);
-                    statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.half_size[axis]);
-                }
-                statistics.counts[settings.grid_level(ellipse.radius)] += 1;
-                statistics.has_caps |= ellipse.cap.is_some();
+        let of_tasks = tasks.par_iter().map(|sprites| Self::of(settings, sprites));
+        of_tasks.reduce_with(Self::merge).unwrap_or(Self::EMPTY)
+    }
+
+    /// Bounds and sizes of the sprites of one task.
+    fn of<const P: usize>(settings: &SplatSettings, sprites: &[Sprite<P>]) -> Self {
+        let mut statistics = Self::EMPTY;
+        for Sprite { ellipse, .. } in sprites {
+            for axis in 0..2 {
+                statistics.low[axis] = statistics.low[axis].min(ellipse.center[axis] - ellipse.half_size[axis]);
+                statistics.high[axis] = statistics.high[axis].max(ellipse.center[axis] + ellipse.half_size[axis]);
             }
-            statistics
-        };
-        tasks.par_iter().map(of_task).reduce_with(Self::merge).unwrap_or(Self::EMPTY)
+            statistics.counts[settings.grid_level(ellipse.radius)] += 1;
+            statistics.has_caps |= ellipse.cap.is_some();
+        }
+        statistics
     }
 
     fn merge(mut self, other: Self) -> Self {
@@ -203,21 +218,20 @@ impl SpriteStatistics {
         /// 1 / maximum fraction of the sprites that would need a finer level.
         const MAX_FINER_INVERSE: usize = 50;
         let total: usize = self.counts.iter().sum();
-        let mut finer = 0;
-        let exceeds_limit = |count: &usize| {
-            finer += count;
-            finer * MAX_FINER_INVERSE > total
-        };
-        self.counts.iter().position(exceeds_limit).unwrap_or(0)
+        let mut up_to_level = 0;
+        for (level, count) in self.counts.iter().enumerate() {
+            up_to_level += count;
+            if up_to_level * MAX_FINER_INVERSE > total {
+                return level;
+            }
+        }
+        0
     }
 
     /// The pixels of the picture that sprites touch, extended to whole batches.
     fn covered(&self, picture: [usize; 2]) -> Option<Rect> {
-        let clip = |value: [f32; 2]| {
-            let [x, y] = value.map(|value| value.max(0.0) as usize);
-            [x.min(picture[0]), y.min(picture[1])]
-        };
-        let ([x, y], [right, bottom]) = (clip(self.low), clip(self.high.map(|value| value + 1.0)));
+        let [x, y] = [0, 1].map(|axis| (self.low[axis].max(0.0) as usize).min(picture[axis]));
+        let [right, bottom] = [0, 1].map(|axis| ((self.high[axis] + 1.0).max(0.0) as usize).min(picture[axis]));
         (right > x && bottom > y).then(|| aligned_to_lanes(Rect { x, y, width: right - x, height: bottom - y }))
     }
 }
@@ -226,15 +240,16 @@ impl SpriteStatistics {
 fn add_sprites<'a, const P: usize>(
     settings: &SplatSettings,
     tasks: &[PooledVec<'a, Sprite<P>>],
-    is_on_this_grid: impl Fn(f32) -> bool + Sync,
+    levels: GridLevels,
     whole_picture_columns: Range<i32>,
     directions: &[[f32; 3]],
     grid: &mut Grid,
 ) {
     let cells = grid.cells;
     let (row_length, level) = (grid.row_length(), bansho_base::math::simd::level());
-    let bin = |task: &PooledVec<'a, Sprite<P>>| dispatch!(level, _simd => BinnedSprites::new(settings, task, &cells, &is_on_this_grid));
-    let binned: Vec<BinnedSprites<P>> = tasks.par_iter().map(bin).collect();
+    let binned =
+        tasks.par_iter().map(|task| dispatch!(level, _simd => BinnedSprites::new(settings, task, &cells, levels)));
+    let binned: Vec<BinnedSprites<P>> = binned.collect();
     grid.values_mut().par_chunks_mut(ROWS_PER_TASK * row_length).enumerate().for_each(|(index, values)| {
         let (columns, whole_picture_columns) = (cells.picture_columns(), whole_picture_columns.clone());
         let top = cells.first[1] + (index * ROWS_PER_TASK) as i32;
@@ -340,27 +355,18 @@ struct BinnedSprites<'a, const P: usize> {
 
 impl<'a, const P: usize> BinnedSprites<'a, P> {
     #[inline(always)]
-    fn new(
-        settings: &SplatSettings,
-        task: &PooledVec<'a, Sprite<P>>,
-        cells: &Raster,
-        is_on_this_grid: impl Fn(f32) -> bool,
-    ) -> Self {
+    fn new(settings: &SplatSettings, task: &PooledVec<'a, Sprite<P>>, cells: &Raster, levels: GridLevels) -> Self {
         let mut sprites = task.pool().take(task.len());
         sprites.clear();
         for sprite in task.iter() {
-            if is_on_this_grid(sprite.ellipse.radius) {
+            if settings.is_on_grid(sprite.ellipse.radius, levels) {
                 sprites.push(RasterizedSprite::new(settings, sprite, cells));
             }
         }
-        let bands_of = |sprite: &RasterizedSprite<P>| {
-            let [from, to] = sprite.rows.map(|row| (row - cells.first[1]) as usize);
-            if from < to { from / ROWS_PER_TASK..to.div_ceil(ROWS_PER_TASK) } else { 0..0 }
-        };
         let bands = cells.rows.div_ceil(ROWS_PER_TASK);
         let mut starts = vec![0_u32; bands + 1];
         for sprite in sprites.iter() {
-            for row_band in bands_of(sprite) {
+            for row_band in row_bands(sprite, cells) {
                 starts[row_band + 1] += 1;
             }
         }
@@ -370,7 +376,7 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
         let mut ends = starts.clone();
         let mut members = vec![0; starts[bands] as usize];
         for (index, sprite) in sprites.iter().enumerate() {
-            for row_band in bands_of(sprite) {
+            for row_band in row_bands(sprite, cells) {
                 members[ends[row_band] as usize] = index as u16;
                 ends[row_band] += 1;
             }
@@ -382,6 +388,13 @@ impl<'a, const P: usize> BinnedSprites<'a, P> {
     fn members_of_band(&self, row_band: usize) -> &[u16] {
         &self.members[self.starts[row_band] as usize..self.starts[row_band + 1] as usize]
     }
+}
+
+/// The row bands that a sprite touches.
+#[inline(always)]
+fn row_bands<const P: usize>(sprite: &RasterizedSprite<P>, cells: &Raster) -> Range<usize> {
+    let [from, to] = [sprite.rows[0] - cells.first[1], sprite.rows[1] - cells.first[1]];
+    if from < to { from as usize / ROWS_PER_TASK..(to as usize).div_ceil(ROWS_PER_TASK) } else { 0..0 }
 }
 
 #[cfg(test)]

@@ -14,7 +14,10 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use crate::particles::simulate::burner::Burner;
+use crate::particles::simulate::{
+    burner::Burner,
+    vectors::{linear, scaled},
+};
 
 /// Number of layers of height.
 const LAYERS: usize = 24;
@@ -49,9 +52,9 @@ pub(crate) fn plume_axes(
     strength: f64,
     t: f64,
 ) -> Vec<PlumeAxis> {
-    let scale = |burner: &Burner| LAYERS as f64 / (1.5 * burner.height + burner.bounding_radius);
     // Height of the base and layers per meter of each burner.
-    let bases: Vec<(f64, f64)> = burners.iter().map(|b| (b.position(t).y, scale(b))).collect();
+    let bases: Vec<(f64, f64)> =
+        burners.iter().map(|burner| (burner.position(t).y, layers_per_meter(burner))).collect();
     let mut sums = vec![[[0.0_f64; 3]; LAYERS + 1]; burners.len()];
     for (index, &number) in burner_indices.iter().enumerate() {
         let (base, scale) = bases[number as usize];
@@ -63,8 +66,13 @@ pub(crate) fn plume_axes(
     burners
         .iter()
         .zip(&sums)
-        .map(|(burner, sums)| PlumeAxis::new(burner, burner.position(t), scale(burner), sums, strength))
+        .map(|(burner, sums)| PlumeAxis::new(burner, burner.position(t), layers_per_meter(burner), sums, strength))
         .collect()
+}
+
+/// Layers per meter above a burner: all of them together reach somewhat above its flame.
+fn layers_per_meter(burner: &Burner) -> f64 {
+    LAYERS as f64 / (1.5 * burner.height + burner.bounding_radius)
 }
 
 impl PlumeAxis {
@@ -86,11 +94,14 @@ impl PlumeAxis {
     /// Sets the center of each layer to the mean position of the gas in it and its two neighbors; if they are empty, to the center below.
     fn smooth(&mut self, sums: &[[f64; 3]; LAYERS + 1]) {
         for layer in 0..=LAYERS {
-            let neighbors = layer.saturating_sub(1)..(layer + 2).min(LAYERS + 1);
-            let total = |k: usize| sums[neighbors.clone()].iter().map(|sum| sum[k]).sum::<f64>();
-            let count = total(2);
+            let [mut x, mut z, mut count] = [0.0; 3];
+            for sum in &sums[layer.saturating_sub(1)..(layer + 2).min(LAYERS + 1)] {
+                x += sum[0];
+                z += sum[1];
+                count += sum[2];
+            }
             if count > 0.0 {
-                self.centers[layer] = [(total(0) / count) as f32, (total(1) / count) as f32];
+                self.centers[layer] = [(x / count) as f32, (z / count) as f32];
             } else if layer > 0 {
                 self.centers[layer] = self.centers[layer - 1];
             }
@@ -108,21 +119,20 @@ impl PlumeAxis {
     /// Velocity of gas at `position` toward the axis, m/s.
     #[inline(always)]
     pub(crate) fn velocity<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
-        let splat = |value: f32| Lanes::splat(simd, value);
-        let height = (position[1] - splat(self.base)).simd_max(splat(0.0));
+        let zero = Lanes::splat(simd, 0.0);
+        let height = (position[1] - Lanes::splat(simd, self.base)).simd_max(zero);
         let [x, z] = self.centers_at(simd, height);
         let offset = [position[0] - x, position[2] - z];
         let distance = offset[0].fma(offset[0], offset[1] * offset[1]).simd_sqrt();
-        let speed_squared = height.fma(splat(2.0 * self.acceleration), splat(self.speed_squared));
-        let speed = speed_squared.simd_sqrt().simd_max(splat(1e-6));
+        let speed_squared = linear(height, 2.0 * self.acceleration, self.speed_squared);
+        let speed = speed_squared.simd_sqrt().simd_max(Lanes::splat(simd, 1e-6));
         // A large burner has several plumes: the inflow toward one axis vanishes at a distance of two diameters.
-        let attenuation = (splat(2.0) - distance * splat(1.0 / self.diameter)).simd_clamp01();
-        let max_inflow = speed.fma(splat(MAX_INFLOW_FRACTION), splat(self.inflow));
-        let inward = (distance * splat(0.5 * self.acceleration) / speed).simd_min(max_inflow)
-            * attenuation
-            * splat(self.strength);
-        let scale = (splat(0.0) - inward) / distance.simd_max(splat(f32::MIN_POSITIVE));
-        [offset[0] * scale, splat(0.0), offset[1] * scale]
+        let attenuation = (Lanes::splat(simd, 2.0) - scaled(distance, 1.0 / self.diameter)).simd_clamp01();
+        let max_inflow = linear(speed, MAX_INFLOW_FRACTION, self.inflow);
+        let inflow = (scaled(distance, 0.5 * self.acceleration) / speed).simd_min(max_inflow);
+        let inward = scaled(inflow * attenuation, self.strength);
+        let scale = (zero - inward) / distance.simd_max(Lanes::splat(simd, f32::MIN_POSITIVE));
+        [offset[0] * scale, zero, offset[1] * scale]
     }
 
     /// Position of the axis at heights above the burner: x and z, m.

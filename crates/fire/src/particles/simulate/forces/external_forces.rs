@@ -1,6 +1,8 @@
 //! External forces of a step: wind, eddies, vortex rings and inflow toward the plume axis, for each burner; sixteen particles at a
 //! time.
 
+use std::ops::Range;
+
 use bansho_base::{
     host::parallel::prelude::*,
     math::{
@@ -24,7 +26,7 @@ use crate::particles::{
     simulate::{
         derived::DerivedConstants,
         particles::GasParticles,
-        vectors::{add_scaled, length, subtract},
+        vectors::{add_scaled, length, linear, scaled, subtract},
     },
 };
 
@@ -146,27 +148,41 @@ impl<'a> StepConstants<'a> {
 
 /// Bounding box of the particles of each burner.
 fn bounds(particles: &GasParticles, burners: usize) -> Vec<[Vec3; 2]> {
-    const EMPTY: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
-    let [x, y, z] = particles.positions();
-    let of_task = |first: usize| {
-        let mut bounds = vec![EMPTY; burners];
-        for index in first..(first + PARTICLES_PER_TASK).min(particles.len()) {
-            let position = Vec3::new(x[index], y[index], z[index]);
-            let [low, high] = &mut bounds[particles.burner[index] as usize];
-            (*low, *high) = (low.min(position), high.max(position));
-        }
-        bounds
-    };
-    let merge = |mut bounds: Vec<[Vec3; 2]>, others: Vec<[Vec3; 2]>| {
-        for ([low, high], [other_low, other_high]) in bounds.iter_mut().zip(others) {
-            (*low, *high) = (low.min(other_low), high.max(other_high));
-        }
-        bounds
-    };
     let tasks = (0..particles.len()).into_par_iter().step_by(PARTICLES_PER_TASK);
-    let bounds = tasks.map(of_task).reduce_with(merge).unwrap_or_else(|| vec![EMPTY; burners]);
-    // A burner without particles gets a unit box: its wind is not used.
-    bounds.into_iter().map(|bounds| if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO, Vec3::ONE] }).collect()
+    let bounds_of_tasks =
+        tasks.map(|first| bounds_of(particles, burners, first..(first + PARTICLES_PER_TASK).min(particles.len())));
+    let mut bounds = bounds_of_tasks.reduce_with(unite_bounds).unwrap_or_else(|| vec![NO_BOUNDS; burners]);
+    for [low, high] in &mut bounds {
+        // A burner without particles gets a unit box: its wind is not used.
+        let has_particles = low.x <= high.x;
+        if !has_particles {
+            (*low, *high) = (Vec3::ZERO, Vec3::ONE);
+        }
+    }
+    bounds
+}
+
+/// Bounds that contain nothing.
+const NO_BOUNDS: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+
+/// Bounding box of the particles of each burner among those of a range.
+fn bounds_of(particles: &GasParticles, burners: usize, range: Range<usize>) -> Vec<[Vec3; 2]> {
+    let [x, y, z] = particles.positions();
+    let mut bounds = vec![NO_BOUNDS; burners];
+    for index in range {
+        let position = Vec3::new(x[index], y[index], z[index]);
+        let [low, high] = &mut bounds[particles.burner[index] as usize];
+        (*low, *high) = (low.min(position), high.max(position));
+    }
+    bounds
+}
+
+/// The boxes around both boxes of each burner.
+fn unite_bounds(mut bounds: Vec<[Vec3; 2]>, others: Vec<[Vec3; 2]>) -> Vec<[Vec3; 2]> {
+    for ([low, high], [other_low, other_high]) in bounds.iter_mut().zip(others) {
+        (*low, *high) = (low.min(other_low), high.max(other_high));
+    }
+    bounds
 }
 
 /// The forces on the gas of one burner.
@@ -202,15 +218,14 @@ impl BurnerForces<'_> {
     /// Entrainment rate, mass of entrained air per mass of gas, 1/s: `alpha |u - w| / (D / 2)`, half of that for enclosed gas.
     #[inline(always)]
     pub(crate) fn mixing<R: Real>(&self, velocity: &[R; 3], wind: &[R; 3], air_exposure: R) -> R {
-        let splat = |value: f32| air_exposure.broadcast(value);
-        length(&subtract(velocity, wind)) * air_exposure.fma(splat(self.entrainment), splat(0.5 * self.entrainment))
+        length(&subtract(velocity, wind)) * linear(air_exposure, self.entrainment, 0.5 * self.entrainment)
     }
 
     /// Velocity by which the air advects gas of that speed and age, m/s. Turbulence grows with age and is proportional to the speed.
     #[inline(always)]
     pub(crate) fn advection_velocity<R: Real>(&self, air: &AirVelocity<R>, speed: R, age: R) -> [R; 3] {
         let growth = age / (age + age.broadcast(self.turbulent_age));
-        add_scaled(&air.steady, &air.eddies, speed * growth * age.broadcast(self.turbulence))
+        add_scaled(&air.steady, &air.eddies, scaled(speed * growth, self.turbulence))
     }
 
     /// Velocity of the air at sixteen positions.

@@ -147,13 +147,17 @@ impl<S: Simd> Row<'_, S> {
 fn sample(tile: &[[f32; 4]], position: Vec3) -> [f32; 4] {
     let floor = position.floor();
     let f = position - floor;
-    let cell = floor.as_ivec3();
-    let wrap = |coordinate: i32, step: i32| (coordinate.wrapping_add(step) & (SIDE as i32 - 1)) as usize;
-    let row = |j: i32, k: i32| {
-        let start = (wrap(cell.z, k) * SIDE + wrap(cell.y, j)) * SIDE;
-        lerp4(&tile[start + wrap(cell.x, 0)], &tile[start + wrap(cell.x, 1)], f.x)
-    };
-    lerp4(&lerp4(&row(0, 0), &row(1, 0), f.y), &lerp4(&row(0, 1), &row(1, 1), f.y), f.z)
+    // The grid planes before and after the position along each axis. The tile is periodic, and its side a power of two.
+    let [x, y, z] = floor
+        .as_ivec3()
+        .to_array()
+        .map(|cell| [cell, cell.wrapping_add(1)].map(|coordinate| (coordinate & (SIDE as i32 - 1)) as usize));
+    let mut rows = [[0.0; 4]; 4];
+    for (index, row) in rows.iter_mut().enumerate() {
+        let start = (z[index / 2] * SIDE + y[index % 2]) * SIDE;
+        *row = lerp4(&tile[start + x[0]], &tile[start + x[1]], f.x);
+    }
+    lerp4(&lerp4(&rows[0], &rows[1], f.y), &lerp4(&rows[2], &rows[3], f.y), f.z)
 }
 
 /// One noise potential on the grid.

@@ -15,7 +15,10 @@ use fearless_simd::Simd;
 use super::entrainment_axis::PlumeAxis;
 use crate::particles::{
     parameters::FlameParticlesParameters,
-    simulate::{burner::Burner, vectors::dot},
+    simulate::{
+        burner::Burner,
+        vectors::{dot, scaled},
+    },
 };
 
 /// Maximum number of rings that a burner sheds side by side.
@@ -50,27 +53,28 @@ impl VortexRing {
     /// Adds the velocity of the air at `position`, m/s.
     #[inline(always)]
     pub(crate) fn add_velocity<S: Simd>(&self, position: &[Lanes<S>; 3], sum: &mut [Lanes<S>; 3]) {
-        let splat = |value: f32| position[0].broadcast(value);
-        let (center, axis) = (self.center.to_array(), self.axis.to_array());
-        let mut offset = *position;
+        let (center, direction) = (self.center.to_array(), self.axis.to_array());
+        let (mut offset, mut axis) = (*position, *position);
         for c in 0..3 {
-            offset[c] = (position[c] - splat(center[c])) * splat(self.inverse_extent);
+            offset[c] = scaled(position[c] - position[c].broadcast(center[c]), self.inverse_extent);
+            axis[c] = position[c].broadcast(direction[c]);
         }
-        let q = splat(1.0) - dot(&offset, &offset);
+        let zero = position[0].broadcast(0.0);
+        let q = position[0].broadcast(1.0) - dot(&offset, &offset);
+        // Most rings reach none of the sixteen positions.
         if !any_positive(q) {
             return;
         }
-        let q = q.simd_max(splat(0.0));
-        let axis = [splat(axis[0]), splat(axis[1]), splat(axis[2])];
+        let q = q.simd_max(zero);
         let height = dot(&offset, &axis);
         let mut radial = offset;
         for c in 0..3 {
-            radial[c] = axis[c].fma(splat(0.0) - height, offset[c]);
+            radial[c] = axis[c].fma(zero - height, offset[c]);
         }
         // psi = C r^2 q^4 with q = 1 - s^2: u_h = (1/r) dpsi/dr = C (2 q^4 - 8 r^2 q^3), u_r = -(1/r) dpsi/dh = 8 C r h q^3.
-        let cubed = q * q * q * splat(self.strength);
-        let along = cubed * dot(&radial, &radial).fma(splat(-8.0), q * splat(2.0));
-        let outward = cubed * height * splat(8.0);
+        let cubed = scaled(q * q * q, self.strength);
+        let along = cubed * dot(&radial, &radial).fma(q.broadcast(-8.0), scaled(q, 2.0));
+        let outward = scaled(cubed * height, 8.0);
         for c in 0..3 {
             sum[c] = radial[c].fma(outward, axis[c].fma(along, sum[c]));
         }

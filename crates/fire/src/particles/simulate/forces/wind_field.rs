@@ -9,7 +9,7 @@ use bansho_base::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use crate::particles::simulate::vectors::lerp4;
+use crate::particles::simulate::vectors::{lerp4, scaled};
 
 /// Grid points along each side of the box around the gas.
 const POINTS: usize = 4;
@@ -45,13 +45,13 @@ impl WindField {
     #[inline(always)]
     pub(crate) fn at<S: Simd>(&self, simd: S, position: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         const MASK: u32 = POINTS as u32 - 1;
-        let splat = |value: f32| Lanes::splat(simd, value);
+        let zero = Lanes::splat(simd, 0.0);
+        // The last grid point is excluded: it has no successor.
+        let last = Lanes::splat(simd, (POINTS - 1) as f32 - 1e-3);
         let mut grid_position = *position;
         for c in 0..3 {
-            // The last grid point is excluded: it has no successor.
-            let last = splat((POINTS - 1) as f32 - 1e-3);
-            grid_position[c] =
-                ((position[c] - splat(self.low[c])) * splat(self.scale[c])).simd_max(splat(0.0)).simd_min(last);
+            let offset = position[c] - Lanes::splat(simd, self.low[c]);
+            grid_position[c] = scaled(offset, self.scale[c]).simd_max(zero).simd_min(last);
         }
         let ((x, across), (y, up), (z, along)) = (
             wrap_split(grid_position[0], MASK),
@@ -61,7 +61,7 @@ impl WindField {
         let first = (((z << POINTS.ilog2()) + y) << POINTS.ilog2()) + x;
         let [next_y, next_z] = [POINTS as u32, (POINTS * POINTS) as u32];
         let starts = [first, first + next_y, first + next_z, first + (next_y + next_z)];
-        let mut rows = [[splat(0.0); 4]; 4];
+        let mut rows = [[zero; 4]; 4];
         for k in 0..4 {
             let [here, next] = [gather(simd, &self.velocity, starts[k]), gather(simd, &self.velocity, starts[k] + 1)];
             rows[k] = lerp4(&here, &next, across);

@@ -6,7 +6,10 @@
 
 mod projected;
 
-use bansho_base::camera::{Camera, upright_quad::UprightQuad};
+use bansho_base::{
+    camera::{Camera, upright_quad::UprightQuad},
+    math::DVec2,
+};
 
 pub(crate) use projected::{PATCHES, Projected, ProjectedCells};
 
@@ -57,13 +60,13 @@ impl SheetCells {
     pub(crate) fn new(camera: &Camera, quad: &UprightQuad, resolution: &CellResolution) -> Option<Self> {
         let camera = camera.with_unlimited_angle();
         let center = camera.project(quad.point(0.5, 0.5))?.pixel;
-        let length = |from: [f64; 2], to: [f64; 2]| {
-            let [from, to] = [from, to].map(|[x, y]| camera.project(quad.point(x, y)));
-            let [from, to] = [from?.pixel, to?.pixel].map(|pixel| camera.nearest_repetition(pixel, center));
-            Some((to - from).length())
-        };
-        let up = length([0.5, 0.0], [0.5, 1.0])? * resolution.top;
-        let across = length([0.0, 0.5], [1.0, 0.5])?;
+        let mut sides = [DVec2::ZERO; 4];
+        for (side, [x, y]) in sides.iter_mut().zip([[0.5, 0.0], [0.5, 1.0], [0.0, 0.5], [1.0, 0.5]]) {
+            *side = camera.nearest_repetition(camera.project(quad.point(x, y))?.pixel, center);
+        }
+        let [bottom, top, left, right] = sides;
+        let up = (top - bottom).length() * resolution.top;
+        let across = (right - left).length();
         let small_height = small_height(resolution.texels_up);
         if up >= small_height && across >= SMALL_WIDTH {
             return None;

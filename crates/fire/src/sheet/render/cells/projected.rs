@@ -27,8 +27,11 @@ pub(crate) struct Projected {
 impl Projected {
     #[inline(always)]
     pub(crate) fn lerp(&self, other: &Self, fraction: f32) -> Self {
-        let lerp = |from: f32, to: f32| (to - from).fma(fraction, from);
-        Self { x: lerp(self.x, other.x), y: lerp(self.y, other.y), depth: lerp(self.depth, other.depth) }
+        Self {
+            x: (other.x - self.x).fma(fraction, self.x),
+            y: (other.y - self.y).fma(fraction, self.y),
+            depth: (other.depth - self.depth).fma(fraction, self.depth),
+        }
     }
 
     /// The difference from another point, times `scale`.
@@ -107,16 +110,20 @@ impl ProjectedCells {
 
     /// The pixels that the cells may cover.
     pub(crate) fn bounds(&self, picture: [usize; 2]) -> Rect {
-        let rect = |offset: f64| {
-            let [x, y] = [self.origin[0] + offset, self.origin[1]];
-            let side = |start: f64, length: f64, side: usize| {
-                let [first, end] = [start - 1.0, (start + length + 1.0).ceil()].map(|at| at.clamp(0.0, side as f64));
-                [first as usize, end as usize]
-            };
-            let [[left, right], [top, bottom]] = [side(x, self.size[0], picture[0]), side(y, self.size[1], picture[1])];
-            Rect { x: left, y: top, width: right - left, height: bottom - top }
-        };
-        let repetitions = self.repetitions(picture[0]).map(rect).filter(|rect| !rect.is_empty());
-        repetitions.fold(Rect::default(), |all, rect| all.union(&rect))
+        let [top, bottom] = pixels_around(self.origin[1], self.size[1], picture[1]);
+        let mut all = Rect::default();
+        for offset in self.repetitions(picture[0]) {
+            let [left, right] = pixels_around(self.origin[0] + offset, self.size[0], picture[0]);
+            let rect = Rect { x: left, y: top, width: right - left, height: bottom - top };
+            if !rect.is_empty() {
+                all = all.union(&rect);
+            }
+        }
+        all
     }
+}
+
+/// The first pixel and the one after the last of `count` that an interval and a pixel on both sides of it touch.
+fn pixels_around(start: f64, length: f64, count: usize) -> [usize; 2] {
+    [start - 1.0, (start + length + 1.0).ceil()].map(|edge| edge.clamp(0.0, count as f64) as usize)
 }

@@ -99,6 +99,13 @@ fn add_base_blue<S: Simd>(
     }
 }
 
+/// Distance from [0, 1]: 0 within.
+#[inline(always)]
+fn distance_from_unit_interval<S: Simd>(x: Lanes<S>) -> Lanes<S> {
+    let (zero, one) = (x.broadcast(0.0), x.broadcast(1.0));
+    (zero - x).simd_max(x - one).simd_max(zero)
+}
+
 /// Shades the flat texture square of the paper's pictures 1 to 4, after the threshold if `thresholded`.
 #[inline(always)]
 pub(super) fn shade_flat<S: Simd>(
@@ -109,8 +116,8 @@ pub(super) fn shade_flat<S: Simd>(
     thresholded: bool,
 ) -> Option<ShadedBatch<S>> {
     let (zero, one) = (batch.x.broadcast(0.0), batch.x.broadcast(1.0));
-    let outside = |x: Lanes<S>| (zero - x).simd_max(x - one).simd_max(zero);
-    let strength = zero.select_lt(outside(batch.x) + outside(batch.y), zero, one);
+    let outside = distance_from_unit_interval(batch.x) + distance_from_unit_interval(batch.y);
+    let strength = zero.select_lt(outside, zero, one);
     if !any_positive(strength) {
         return None;
     }

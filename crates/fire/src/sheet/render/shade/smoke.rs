@@ -31,6 +31,13 @@ pub(crate) fn scattered_at(scattered: &[[f32; 3]; LIGHT_SAMPLES], y: f32) -> [f3
     std::array::from_fn(|k| math::f32::lerp(scattered[below][k], scattered[below + 1][k], fraction))
 }
 
+/// The cubic `3 t^2 - 2 t^3` of `t` clamped to [0, 1]. It is not fused, unlike `simd_smoothstep`: its last bits differ.
+#[inline(always)]
+pub(crate) fn unfused_smoothstep<S: Simd>(t: Lanes<S>) -> Lanes<S> {
+    let clamped = t.simd_clamp01();
+    clamped * clamped * (t.broadcast(3.0) - t.broadcast(2.0) * clamped)
+}
+
 /// Light and opacity of sixteen pixels of smoke; `None` if all are empty.
 #[inline(always)]
 pub(super) fn shade_smoke<S: Simd>(
@@ -39,17 +46,13 @@ pub(super) fn shade_smoke<S: Simd>(
     batch: &SheetCoordinates<S>,
 ) -> Option<ShadedBatch<S>> {
     let (x, y) = state.warp.unwarp(batch.x, batch.y);
-    let (zero, one, two) = (x.broadcast(0.0), x.broadcast(1.0), x.broadcast(2.0));
+    let (zero, one) = (x.broadcast(0.0), x.broadcast(1.0));
     // The plume widens as it rises; its density decreases smoothly to 0 at all edges.
     let width =
         y.simd_max(zero).simd_sqrt().fma(one - one.broadcast(smoke.base_width), one.broadcast(smoke.base_width));
-    let across = (two * (x - one.broadcast(0.5))).simd_abs() / width;
-    let smoothstep = |scaled: Lanes<S>| {
-        let clamped = scaled.simd_clamp01();
-        clamped * clamped * (one.broadcast(3.0) - two * clamped)
-    };
-    let side = smoothstep(one - across);
-    let ends = smoothstep(y * one.broadcast(4.0)) * smoothstep((one - y) * one.broadcast(1.6));
+    let across = (one.broadcast(2.0) * (x - one.broadcast(0.5))).simd_abs() / width;
+    let side = unfused_smoothstep(one - across);
+    let ends = unfused_smoothstep(y * one.broadcast(4.0)) * unfused_smoothstep((one - y) * one.broadcast(1.6));
     let envelope = side * ends;
     if !any_positive(envelope) {
         return None;
@@ -64,7 +67,9 @@ pub(super) fn shade_smoke<S: Simd>(
     let opacity = Lanes::from_slice(x.simd, &opacity);
     let (first, last) = (y[0], y[LANES - 1]);
     let (low, high) = (scattered_at(&smoke.scattered, first), scattered_at(&smoke.scattered, last));
-    let scattered = |k: usize| linspace(x.simd, low[k], high[k]) * opacity;
-    let light = [scattered(0), scattered(1), scattered(2), opacity];
+    let mut light = [opacity; 4];
+    for k in 0..3 {
+        light[k] = linspace(x.simd, low[k], high[k]) * opacity;
+    }
     Some(ShadedBatch { t1: density, light })
 }

@@ -10,7 +10,7 @@ use crate::sheet::{
         projection::SheetCoordinates,
         shade::{
             ShadedBatch,
-            smoke::{LIGHT_SAMPLES, scattered_at},
+            smoke::{LIGHT_SAMPLES, scattered_at, unfused_smoothstep},
         },
     },
     soot_field::{displacement::Displacement, plume::PlumeTables},
@@ -60,21 +60,21 @@ pub(super) fn shade_soot<S: Simd>(
         return None;
     }
     let [red, green, blue, kelvin] = tables.light(soot.excess);
-    let [low, high] = [batch.y[0], batch.y[LANES - 1]].map(|y| scattered_at(&state.scattered, y));
+    let low = scattered_at(&state.scattered, batch.y[0]);
+    let high = scattered_at(&state.scattered, batch.y[LANES - 1]);
     let luminance = x.broadcast(state.luminance);
-    let radiance = |k: usize, emitted: Lanes<S>| emitted.fma(luminance, linspace(x.simd, low[k], high[k])) * opacity;
-    Some(ShadedBatch { t1: kelvin, light: [radiance(0, red), radiance(1, green), radiance(2, blue), opacity] })
+    let mut light = [red, green, blue, opacity];
+    for k in 0..3 {
+        light[k] = light[k].fma(luminance, linspace(x.simd, low[k], high[k])) * opacity;
+    }
+    Some(ShadedBatch { t1: kelvin, light })
 }
 
 /// Factor of the optical depth that ends the soot smoothly at the sides and the top of the sheet; 0 outside.
 #[inline(always)]
 fn envelope<S: Simd>(x: Lanes<S>, y: Lanes<S>) -> Lanes<S> {
     let (zero, half, one) = (x.broadcast(0.0), x.broadcast(0.5), x.broadcast(1.0));
-    let smoothstep = |scaled: Lanes<S>| {
-        let clamped = scaled.simd_clamp01();
-        clamped * clamped * (one.broadcast(3.0) - one.broadcast(2.0) * clamped)
-    };
-    let sides = smoothstep((half - (x - half).simd_abs()) * one.broadcast(1.0 / SIDE_FADE));
-    let top = smoothstep((one - y) * one.broadcast(1.0 / TOP_FADE));
+    let sides = unfused_smoothstep((half - (x - half).simd_abs()) * one.broadcast(1.0 / SIDE_FADE));
+    let top = unfused_smoothstep((one - y) * one.broadcast(1.0 / TOP_FADE));
     zero.select_lt(y, sides * top, zero)
 }
