@@ -461,16 +461,16 @@ pub(crate) fn check_energies(parameters: &AuroraParameters) -> Result<(), ShapeE
 
 /// The first point of a sheet's energy curve outside the tables. The curve does not overshoot its points.
 fn first_outside(sheet: &SheetParameters, number: usize, [low, high]: [f64; 2]) -> Option<(usize, ShapeErrorKind)> {
-    let error_at = |(point, [length_fraction, factor]): (usize, &[f64; 2])| {
+    for (point, &[length_fraction, factor]) in sheet.energy_factor.points().iter().enumerate() {
         let (min_ev, max_ev) = (low * factor, high * factor);
         let energy_ev = if max_ev > HIGHEST_EV * (1.0 + RELATIVE_ROUNDING) {
             max_ev
         } else if min_ev < LOWEST_EV * (1.0 - RELATIVE_ROUNDING) {
             min_ev
         } else {
-            return None;
+            continue;
         };
-        Some((point, ShapeErrorKind::EnergyOutside { sheet: number, length_fraction: *length_fraction, energy_ev }))
-    };
-    sheet.energy_factor.points().iter().enumerate().find_map(error_at)
+        return Some((point, ShapeErrorKind::EnergyOutside { sheet: number, length_fraction, energy_ev }));
+    }
+    None
 }

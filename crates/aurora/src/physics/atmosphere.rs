@@ -118,13 +118,14 @@ pub fn covers(altitude_km: f64) -> bool {
 
 /// Altitude in km and air of each row of the table.
 fn read_rows() -> Vec<(f64, AirLevel)> {
-    let rows = TABLE_TEXT.lines().skip(2).map(|line| {
+    let mut rows = Vec::new();
+    for line in TABLE_TEXT.lines().skip(2) {
         // The table is compiled in and a test parses every field, so NaN cannot occur.
         let mut fields = line.split(',').map(|field| field.parse().unwrap_or(f64::NAN));
-        let mut next = || fields.next().unwrap_or(f64::NAN);
-        (next(), AirLevel::from_fields(std::array::from_fn(|_| next())))
-    });
-    rows.collect()
+        let altitude_km = fields.next().unwrap_or(f64::NAN);
+        rows.push((altitude_km, AirLevel::from_fields(std::array::from_fn(|_| fields.next().unwrap_or(f64::NAN)))));
+    }
+    rows
 }
 
 #[cfg(test)]

@@ -173,21 +173,23 @@ fn check_violet() -> Vec<CalibrationCheck> {
 /// Checks of the column for one energy.
 fn check_colors(bounds: &SpectrumBounds, metrics_row: &ColumnMetrics) -> Vec<CalibrationCheck> {
     let (kev, mean_kev) = (metrics_row.energy_kev, bounds.mean_ratio * metrics_row.energy_kev);
-    let of = |what: &str| format!("{}: {what} at {kev} keV", bounds.name);
-    let mut checks = vec![requirement(of("red above 200 km"), metrics_row.red_above_200_km, [0.5, 1.0])];
+    let mut requirements = vec![("red above 200 km", metrics_row.red_above_200_km, [0.5, 1.0])];
     if (1.0..=30.0).contains(&mean_kev) {
-        checks.push(requirement(of("I(557.7)/I(427.8)"), metrics_row.green_to_blue, [2.5, 7.0]));
+        requirements.push(("I(557.7)/I(427.8)", metrics_row.green_to_blue, [2.5, 7.0]));
     }
     if mean_kev <= 1.0 {
-        checks.push(requirement(of("I(630.0)/I(427.8)"), metrics_row.red_to_blue, [2.0, f64::INFINITY]));
+        requirements.push(("I(630.0)/I(427.8)", metrics_row.red_to_blue, [2.0, f64::INFINITY]));
     }
     if mean_kev >= 10.0 {
-        checks.push(requirement(of("I(630.0)/I(427.8)"), metrics_row.red_to_blue, [0.0, 0.5]));
+        requirements.push(("I(630.0)/I(427.8)", metrics_row.red_to_blue, [0.0, 0.5]));
     }
     for (_, rayleigh) in FANG_427_RAYLEIGH.into_iter().filter(|(energy_kev, _)| *energy_kev == kev) {
-        checks.push(requirement(of("I(427.8) to Fang's column"), metrics_row.blue_rayleigh / rayleigh, [0.75, 1.25]));
+        requirements.push(("I(427.8) to Fang's column", metrics_row.blue_rayleigh / rayleigh, [0.75, 1.25]));
     }
-    checks
+    requirements
+        .into_iter()
+        .map(|(what, found, allowed)| requirement(format!("{}: {what} at {kev} keV", bounds.name), found, allowed))
+        .collect()
 }
 
 fn check_peaks(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<CalibrationCheck> {
@@ -214,18 +216,18 @@ fn check_peaks(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<Calibr
 
 /// Both ratios decrease with energy above a mean of 1 keV.
 fn check_slopes(bounds: &SpectrumBounds, metrics: &[ColumnMetrics]) -> Vec<CalibrationCheck> {
-    let pairs = metrics.windows(2).filter(|pair| bounds.mean_ratio * pair[0].energy_kev >= 1.0);
-    let checks = pairs.flat_map(|pair| {
-        let changes = |what: &str| {
-            format!("{}: {what} changes from {} to {} keV by", bounds.name, pair[0].energy_kev, pair[1].energy_kev)
-        };
-        let [green, red] = [pair[1].green_to_blue / pair[0].green_to_blue, pair[1].red_to_blue / pair[0].red_to_blue];
-        [
-            requirement(changes("I(557.7)/I(427.8)"), green, [0.0, 1.0]),
-            requirement(changes("I(630.0)/I(427.8)"), red, [0.0, 0.8]),
-        ]
-    });
-    checks.collect()
+    let mut checks = Vec::new();
+    for pair in metrics.windows(2).filter(|pair| bounds.mean_ratio * pair[0].energy_kev >= 1.0) {
+        let [before, after] = [&pair[0], &pair[1]];
+        let energies = format!("from {} to {} keV", before.energy_kev, after.energy_kev);
+        for (what, change, max) in [
+            ("I(557.7)/I(427.8)", after.green_to_blue / before.green_to_blue, 1.0),
+            ("I(630.0)/I(427.8)", after.red_to_blue / before.red_to_blue, 0.8),
+        ] {
+            checks.push(requirement(format!("{}: {what} changes {energies} by", bounds.name), change, [0.0, max]));
+        }
+    }
+    checks
 }
 
 impl fmt::Display for SpectrumMetrics {

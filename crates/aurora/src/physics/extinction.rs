@@ -32,13 +32,17 @@ const AEROSOL_SCALE_HEIGHT_KM: f64 = 1.2;
 /// Altitude of the middle of the ozone layer and its width, km: the column above falls by a logistic function.
 const OZONE_KM: [f64; 2] = [22.0, 4.5];
 
+/// Ozone column above a height in km, relative to the whole layer: a logistic function about its middle.
+fn ozone_above(height: f64) -> f64 {
+    let [middle, width] = OZONE_KM;
+    1.0 / (1.0 + math::exp((height - middle) / width))
+}
+
 impl Extinction {
     /// What is left of it for an observer at an altitude: the air, the aerosols and the ozone above.
     #[must_use]
     pub fn above(&self, altitude_km: f64) -> Self {
         let height = (altitude_km - LOW_KM).max(0.0);
-        let [middle, width] = OZONE_KM;
-        let ozone_above = |height: f64| 1.0 / (1.0 + math::exp((height - middle) / width));
         Self {
             rayleigh: self.rayleigh * math::exp(-height / AIR_SCALE_HEIGHT_KM),
             aerosol: self.aerosol * math::exp(-height / AEROSOL_SCALE_HEIGHT_KM),

@@ -1,9 +1,15 @@
-//! AOVs of an aurora: brightness of lines and bands in kilorayleighs, and maps of the simulation grid.
+//! AOVs of an aurora: brightness of lines and bands in kilorayleighs, and maps of the simulation grid (thesis, figures 2.10
+//! to 2.12, 2.14, 3.14), sampled where lines of sight intersect the drawn plane.
 
-use bansho_base::phenomenon::strip::{AovDescriptor, AovRule};
+use bansho_base::{
+    math::DVec2,
+    phenomenon::strip::{AovDescriptor, AovRule},
+};
 
-use super::maps::MAPS;
-use crate::physics::emission::{LINES, Line, LineSet, SpectralEmitter};
+use crate::{
+    physics::emission::{LINES, Line, LineSet, SpectralEmitter},
+    simulate::{AuroraSimulation, field::Grid2},
+};
 
 /// Wavelengths of the lines that the AOVs measure, nm.
 pub(crate) const MEASURED: [f64; 6] = [557.7, 630.0, 636.4, 427.8, 391.4, 670.5];
@@ -17,8 +23,7 @@ pub(crate) fn measured_lines() -> impl Iterator<Item = &'static Line> {
 
 /// Emitter of each of the [`BRIGHTNESSES`], and its photons per counted photon of the emitter: 0 for lines that are not emitted.
 pub(crate) fn brightnesses(lines: LineSet) -> impl Iterator<Item = (SpectralEmitter, f64)> {
-    let photons = move |line: &Line| if lines.has(line) { line.photons } else { 0.0 };
-    let measured = measured_lines().map(move |line| (line.emitter, photons(line)));
+    let measured = measured_lines().map(move |line| (line.emitter, if lines.has(line) { line.photons } else { 0.0 }));
     let first_positive = match lines {
         LineSet::Observed => 1.0,
         LineSet::Thesis => lines.lines(SpectralEmitter::Nitrogen).iter().map(|(_, photons)| photons).sum(),
@@ -26,8 +31,12 @@ pub(crate) fn brightnesses(lines: LineSet) -> impl Iterator<Item = (SpectralEmit
     measured.chain([(SpectralEmitter::Nitrogen, first_positive)])
 }
 
+const fn descriptor(name: &'static str, unit: &'static str, doc: &'static str) -> AovDescriptor {
+    AovDescriptor { name, unit, doc, rule: AovRule::Sum }
+}
+
 const fn brightness(name: &'static str, doc: &'static str) -> AovDescriptor {
-    AovDescriptor { name, unit: "kR", doc, rule: AovRule::Sum }
+    descriptor(name, "kR", doc)
 }
 
 /// AOVs of an aurora, in the order of [`brightnesses`] and then of [`MAPS`].
@@ -65,3 +74,53 @@ pub(crate) const AOVS: &[AovDescriptor] = &[
     MAPS[2],
     MAPS[3],
 ];
+
+/// Descriptors of the maps.
+pub(crate) const MAPS: [AovDescriptor; 4] = [
+    descriptor(
+        "scatter_count",
+        "1",
+        "Number of particles scattered about the in-between shape, N(i, j), in the cell where the line of sight passes 100 km altitude; 0 outside the drawn square.",
+    ),
+    descriptor(
+        "particle_count",
+        "1",
+        "Number of particles in the cell where the line of sight passes 100 km altitude; 0 outside the drawn square.",
+    ),
+    descriptor(
+        "potential",
+        "km^2/s^2",
+        "Potential of the in-between shape where the line of sight passes 100 km altitude, without its noise; 0 outside the drawn square.",
+    ),
+    descriptor(
+        "potential_noise",
+        "km^2/s^2",
+        "Noise in the potential where the line of sight passes 100 km altitude; 0 outside the drawn square.",
+    ),
+];
+
+/// The maps of one simulation state.
+pub(super) struct CellMaps<'a> {
+    simulation: &'a AuroraSimulation,
+    particle_counts: Grid2,
+}
+
+impl<'a> CellMaps<'a> {
+    pub(super) fn new(simulation: &'a AuroraSimulation) -> Self {
+        Self { simulation, particle_counts: simulation.particle_counts() }
+    }
+
+    /// The values of [`MAPS`] at a position of the drawn plane, km.
+    pub(super) fn at(&self, position: DVec2) -> [f32; MAPS.len()] {
+        let potential = self.simulation.potential();
+        let Some([column, row]) = potential.cell(position.to_array()) else { return [0.0; MAPS.len()] };
+        let [scattered, particles] = [self.simulation.scatter_counts(), &self.particle_counts]
+            .map(|counts| counts.at(column as isize, row as isize) as f32);
+        [
+            scattered,
+            particles,
+            potential.sample(position.to_array()) as f32,
+            self.simulation.potential_noise(position) as f32,
+        ]
+    }
+}

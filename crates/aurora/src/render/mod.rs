@@ -11,7 +11,6 @@ pub(crate) mod bin;
 pub(crate) mod emitted_light;
 pub(crate) mod inputs;
 pub(crate) mod integrate;
-pub(crate) mod maps;
 pub(crate) mod prepared;
 pub(crate) mod project;
 pub(crate) mod shade;

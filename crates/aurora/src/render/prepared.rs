@@ -20,11 +20,11 @@ use bansho_base::{
 };
 use fearless_simd::{Level, Simd, dispatch};
 
-use super::{Blur, inputs::RenderInputs, maps::CellMaps, shutter};
+use super::{Blur, inputs::RenderInputs, shutter};
 use crate::{
     physics::emission::{PerEmitter, SpectralEmitter},
     render::{
-        aovs::{BRIGHTNESSES, brightnesses},
+        aovs::{BRIGHTNESSES, CellMaps, brightnesses},
         bin::{source_bins::SortedSources, sources::Sources},
         integrate::columns::ColumnBuffer,
         project::{
@@ -140,12 +140,12 @@ impl ChartBuilder<'_> {
         let row = (spread_km / 130.0).clamp(pixel, 2.0 * pixel);
         let chart = Chart::new(&self.coverage, pixel, row);
         let buffer = self.inputs.chart_memory.zeros(chart);
-        let sorted = |columns| SortedSources::new(&sources.sharp, &buffer.chart, columns, self.field, spread_km);
-        let Some(collisions) = &self.inputs.tables.collisions else {
-            let sorted_sources = sorted(BLOCK_COLUMNS);
+        let collisions = &self.inputs.tables.collisions;
+        let columns = if collisions.is_some() { COLLISION_BLOCK_COLUMNS } else { BLOCK_COLUMNS };
+        let sorted_sources = SortedSources::new(&sources.sharp, &buffer.chart, columns, self.field, spread_km);
+        let Some(collisions) = collisions else {
             return buffer.integrate(self.field, &self.inputs.tables.profiles, &sorted_sources);
         };
-        let sorted_sources = sorted(COLLISION_BLOCK_COLUMNS);
         let step = (self.inputs.simulation.time() / AuroraSimulation::STEP_S).round() as i64 as u32;
         collisions.draw(buffer, self.field, &sorted_sources, step)
     }

@@ -10,7 +10,7 @@ use super::{
         split_merge::{ChainLink, Transition},
         time_warping::warp_through,
     },
-    geometry::polyline::{Polyline, length_fractions},
+    geometry::polyline::{Polyline, length_fractions, line_length},
     interpolation::{
         gap::Gap,
         spline_track::{ControlPointTrack, Knot},
@@ -50,8 +50,11 @@ pub(crate) fn drawn_shapes(
     extent_km: f64,
     assets: &dyn Assets,
 ) -> Result<Vec<Vec<DrawnSheet>>, ShapeError> {
-    let draw = |(shape, parameters)| drawn_sheets(parameters, ShapeContext { shape, extent_km }, assets);
-    shapes.iter().enumerate().map(draw).collect()
+    let mut drawn = Vec::with_capacity(shapes.len());
+    for (shape, parameters) in shapes.iter().enumerate() {
+        drawn.push(drawn_sheets(parameters, ShapeContext { shape, extent_km }, assets)?);
+    }
+    Ok(drawn)
 }
 
 /// Tracks control points through all shapes. `evenness` weights uniform spacing against distance in the automatic
@@ -91,10 +94,10 @@ pub(crate) fn track_control_points(
             } else {
                 ShapeErrorKind::Unmatched { found, expected }
             };
-            return Err(ShapeError { key: format!("shapes.{index}.sheets"), kind });
+            return Err(ShapeError::in_shape(index, "sheets", kind));
         }
         if in_order && !parameters.link.is_empty() {
-            return Err(ShapeError { key: format!("shapes.{index}.link"), kind: ShapeErrorKind::LinkInOrder });
+            return Err(ShapeError::in_shape(index, "link", ShapeErrorKind::LinkInOrder));
         }
         if in_order {
             tracked.advance_in_order(&transition, &drawn[index], morphing);
@@ -119,9 +122,11 @@ pub(crate) fn track_control_points(
 
 /// Checks the number of control points up to shape `index`.
 fn check_count(found: usize, index: usize) -> Result<(), ShapeError> {
-    let kind = ShapeErrorKind::TooManyPoints { found, max: MAX_POINTS };
-    let error = || ShapeError { key: format!("shapes.{index}.sheets"), kind };
-    if found > MAX_POINTS { Err(error()) } else { Ok(()) }
+    if found > MAX_POINTS {
+        let kind = ShapeErrorKind::TooManyPoints { found, max: MAX_POINTS };
+        return Err(ShapeError::in_shape(index, "sheets", kind));
+    }
+    Ok(())
 }
 
 /// The target of a chain of strands.
@@ -136,21 +141,23 @@ struct ChainTarget<'a> {
 
 /// Whether two drawn shapes have equal positions, flux and energy.
 fn same(first: &[DrawnSheet], last: &[DrawnSheet], extent_km: f64) -> bool {
+    first.len() == last.len() && first.iter().zip(last).all(|(a, b)| same_sheet(a, b, 1e-6 * extent_km))
+}
+
+/// Whether two drawn sheets have equal flux and energy, and positions that differ by less than `tolerance_km`.
+fn same_sheet(a: &DrawnSheet, b: &DrawnSheet, tolerance_km: f64) -> bool {
     const SAMPLES: usize = 64;
-    let near = |a: &DVec2, b: &DVec2| a.distance(*b) < 1e-6 * extent_km;
-    let same_sheet = |(a, b): (&DrawnSheet, &DrawnSheet)| {
-        let [first, last] = [a, b].map(|sheet| sheet.line.resample(SAMPLES));
-        first.iter().zip(&last).all(|(a, b)| near(a, b)) && a.factors.approximately_equals(&b.factors)
-    };
-    first.len() == last.len() && first.iter().zip(last).all(same_sheet)
+    let [a_points, b_points] = [a, b].map(|sheet| sheet.line.resample(SAMPLES));
+    let is_near = a_points.iter().zip(&b_points).all(|(a, b)| a.distance(*b) < tolerance_km);
+    is_near && a.factors.approximately_equals(&b.factors)
 }
 
 /// Control points of a sheet with flux and energy factors.
 fn control_knots(sheet: &DrawnSheet, count: usize, morphing: &MorphingParameters) -> Vec<Knot> {
     let points = sheet.control_points(count, morphing.control_point_spacing);
     let fractions = length_fractions(&points);
-    let knot = |(position, fraction): (DVec2, f64)| Knot { position, factors: sheet.factors.at(fraction) };
-    points.into_iter().zip(fractions).map(knot).collect()
+    let positions = points.into_iter().zip(fractions);
+    positions.map(|(position, fraction)| Knot { position, factors: sheet.factors.at(fraction) }).collect()
 }
 
 impl TrackedControlPoints {
@@ -159,17 +166,26 @@ impl TrackedControlPoints {
         self.shapes[shape].iter().map(Vec::len).sum()
     }
 
+    /// Positions of tracks at shape `knot`, km.
+    fn positions(&self, tracks: &[usize], knot: usize) -> Vec<DVec2> {
+        tracks.iter().map(|&track| self.tracks[track].knot(knot).position).collect()
+    }
+
     /// Pairs of coincident tracks of the last and the first shape.
     fn repeated_points(&self) -> Vec<[usize; 2]> {
         let last = self.shapes.len() - 1;
-        let same_count = |(first, last): &(&Vec<usize>, &Vec<usize>)| first.len() == last.len();
-        let sheets = self.shapes[0].iter().zip(&self.shapes[last]).filter(same_count);
-        let pairs = sheets.flat_map(|(firsts, lasts)| lasts.iter().zip(firsts).map(|(&last, &first)| [last, first]));
-        let meets = |pair: &[usize; 2]| {
-            let [last_knot, first_knot] = [self.tracks[pair[0]].knot(last), self.tracks[pair[1]].knot(0)];
-            last_knot.position.distance(first_knot.position) < SAME_KM
-        };
-        let mut pairs: Vec<[usize; 2]> = pairs.filter(meets).collect();
+        let mut pairs = Vec::new();
+        for (firsts, lasts) in self.shapes[0].iter().zip(&self.shapes[last]) {
+            if firsts.len() != lasts.len() {
+                continue;
+            }
+            for (&first_track, &last_track) in firsts.iter().zip(lasts) {
+                let [first_knot, last_knot] = [self.tracks[first_track].knot(0), self.tracks[last_track].knot(last)];
+                if last_knot.position.distance(first_knot.position) < SAME_KM {
+                    pairs.push([last_track, first_track]);
+                }
+            }
+        }
         pairs.sort_unstable();
         pairs
     }
@@ -213,11 +229,13 @@ impl TrackedControlPoints {
             .flat_map(|pair| pair.new)
             .chain(transition.merges.iter().map(|pair| pair.new[1]))
             .collect();
-        let sheet = |chain: &Vec<ChainLink>| -> Vec<usize> {
-            let tracks = chain.iter().flat_map(|&link| transition.tracks_along(link));
-            tracks.filter(|track| !dropped.contains(track)).collect()
-        };
-        self.shapes.push(transition.chains.iter().map(sheet).collect());
+        let mut next_sheets = Vec::with_capacity(transition.chains.len());
+        for chain in 0..transition.chains.len() {
+            let mut tracks = transition.tracks_of(chain);
+            tracks.retain(|track| !dropped.contains(track));
+            next_sheets.push(tracks);
+        }
+        self.shapes.push(next_sheets);
     }
 
     /// Automatic correspondence: chains by sheet matching, points by time warping.
@@ -230,12 +248,11 @@ impl TrackedControlPoints {
         evenness: f64,
     ) {
         let knot = self.shapes.len() - 1;
-        let position = |track: &usize| self.tracks[*track].knot(knot).position;
-        let line = |chain: &Vec<ChainLink>| -> Vec<DVec2> {
-            chain.iter().flat_map(|&link| transition.tracks_along(link)).map(|track| position(&track)).collect()
-        };
-        // A strand has at least two points, so the polyline exists.
-        let sources: Vec<Polyline> = transition.chains.iter().filter_map(|chain| Polyline::new(line(chain))).collect();
+        let mut sources = Vec::with_capacity(transition.chains.len());
+        for chain in 0..transition.chains.len() {
+            // A strand has at least two points, so the polyline exists.
+            sources.extend(Polyline::new(self.positions(&transition.tracks_of(chain), knot)));
+        }
         let targets: Vec<&Polyline> = drawn.iter().map(|sheet| &sheet.line).collect();
         let matches = match_sheets(&sources, &targets, &constraints.chain_constraints);
         let mut sheets = vec![Vec::new(); drawn.len()];
@@ -256,10 +273,7 @@ impl TrackedControlPoints {
         let ChainTarget { drawn, matched, first_shape, evenness, constraints } = target;
         let knot = self.shapes.len() - 1;
         let strands: Vec<Vec<usize>> = chain.iter().map(|&link| transition.tracks_along(link)).collect();
-        let points: Vec<Vec<DVec2>> = strands
-            .iter()
-            .map(|strand| strand.iter().map(|&track| self.tracks[track].knot(knot).position).collect())
-            .collect();
+        let points: Vec<Vec<DVec2>> = strands.iter().map(|strand| self.positions(strand, knot)).collect();
         let mut sheet: Vec<usize> = Vec::new();
         for ((strand, points), range) in strands.iter().zip(&points).zip(strand_ranges(&points)) {
             let range = if matched.reversed { range.map(|fraction| 1.0 - fraction) } else { range };
@@ -269,9 +283,10 @@ impl TrackedControlPoints {
             let knots: Vec<Knot> = match repeated {
                 Some(first) => first.iter().map(|&track| self.tracks[track].knot(0)).collect(),
                 None => {
-                    let knot =
-                        |fraction: f64| Knot { position: drawn.line.at(fraction), factors: drawn.factors.at(fraction) };
-                    warp_through(points, &drawn.line, range, &anchors, *evenness).into_iter().map(knot).collect()
+                    let fractions = warp_through(points, &drawn.line, range, &anchors, *evenness).into_iter();
+                    fractions
+                        .map(|fraction| Knot { position: drawn.line.at(fraction), factors: drawn.factors.at(fraction) })
+                        .collect()
                 }
             };
             let is_backward = repeated.is_some() && matched.reversed;
@@ -289,22 +304,21 @@ impl TrackedControlPoints {
 /// Range of a sheet's length for each strand of a chain, in proportion to the strand's length plus half of the adjacent
 /// gaps.
 fn strand_ranges(strands: &[Vec<DVec2>]) -> Vec<[f64; 2]> {
-    let length = |points: &[DVec2]| points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
-    let gap = |index: usize| match (
-        strands.get(index).and_then(|s| s.last()),
-        strands.get(index + 1).and_then(|s| s.first()),
-    ) {
-        (Some(end), Some(start)) => end.distance(*start),
-        _ => 0.0,
-    };
     let mut ends = vec![0.0];
+    let mut gap_before = 0.0;
     for (index, points) in strands.iter().enumerate() {
-        let before = if index > 0 { gap(index - 1) } else { 0.0 };
-        ends.push(ends[index] + length(points) + (before + gap(index)) / 2.0);
+        let gap_after = match (points.last(), strands.get(index + 1).and_then(|next| next.first())) {
+            (Some(end), Some(start)) => end.distance(*start),
+            _ => 0.0,
+        };
+        ends.push(ends[index] + line_length(points) + (gap_before + gap_after) / 2.0);
+        gap_before = gap_after;
     }
     let total = ends[strands.len()];
-    let fraction = |index: usize| if total > 0.0 { ends[index] / total } else { index as f64 / strands.len() as f64 };
-    (0..strands.len()).map(|index| [fraction(index), fraction(index + 1)]).collect()
+    for (index, end) in ends.iter_mut().enumerate() {
+        *end = if total > 0.0 { *end / total } else { index as f64 / strands.len() as f64 };
+    }
+    ends.windows(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
 #[cfg(test)]

@@ -12,6 +12,13 @@ pub struct ShapeError {
     pub kind: ShapeErrorKind,
 }
 
+impl ShapeError {
+    /// An error at a key of shape `index`, such as `merge.0`.
+    pub(super) fn in_shape(index: usize, key: &str, kind: ShapeErrorKind) -> Self {
+        Self { key: format!("shapes.{index}.{key}"), kind }
+    }
+}
+
 /// Reasons why a shape is invalid. Sheets, points and segments are counted from 1 here, as in messages.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeErrorKind {

@@ -27,6 +27,11 @@ bansho_base::choice! {
 /// Number of segments of a form's line.
 const SEGMENTS: usize = 256;
 
+/// Sine of an angle in turns.
+fn wave(turns: f64) -> f64 {
+    math::sin(std::f64::consts::TAU * turns)
+}
+
 impl Form {
     /// Default bend, degrees.
     fn default_bend_deg(self) -> f64 {
@@ -53,7 +58,6 @@ impl Form {
 
     /// Heading at the fraction `s` of the length, in units of the bend: 0 is east, positive is south.
     fn heading(self, s: f64, count: f64) -> f64 {
-        let wave = |turns: f64| math::sin(std::f64::consts::TAU * turns);
         match self {
             Self::Arc => s - 0.5,
             Self::Band => wave(count * s) * (0.65 + 0.35 * wave(0.31 + 0.7 * s)),

@@ -18,7 +18,7 @@ pub(crate) mod strokes;
 
 pub use error::{ShapeError, ShapeErrorKind};
 pub use form::Form;
-pub(crate) use geometry::polyline::cumulative_lengths;
+pub(crate) use geometry::polyline::{cumulative_lengths, line_length};
 pub use geometry::{
     nearest_segment::NearestSegmentGrid,
     segments::{SheetSample, SheetSampler},

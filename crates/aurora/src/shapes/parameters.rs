@@ -239,14 +239,15 @@ const DEFAULT_SECOND: [[[f64; 2]; 8]; 2] = [
 /// Two slowly waving curtains, scaled to a square of that side.
 pub(super) fn default_shapes(extent_km: f64) -> Vec<ShapeParameters> {
     let scale = extent_km / DRAWN_EXTENT_KM;
-    let curtain = |stroke: &[[f64; 2]; 8]| SheetParameters {
-        points: Some(stroke.iter().map(|point| point.map(|km| km * scale)).collect()),
-        ..SheetParameters::default()
-    };
-    let shape = |strokes: &[[[f64; 2]; 8]; 2]| ShapeParameters {
-        transition_s: Some(20.0),
-        sheets: strokes.iter().map(curtain).collect(),
-        ..ShapeParameters::default()
-    };
-    vec![ShapeParameters { transition_s: None, ..shape(&DEFAULT_FIRST) }, shape(&DEFAULT_SECOND), shape(&DEFAULT_FIRST)]
+    let mut shapes = Vec::new();
+    for (transition_s, strokes) in [(None, &DEFAULT_FIRST), (Some(20.0), &DEFAULT_SECOND), (Some(20.0), &DEFAULT_FIRST)]
+    {
+        let mut shape = ShapeParameters { transition_s, ..ShapeParameters::default() };
+        for stroke in strokes {
+            let points = stroke.iter().map(|point| point.map(|km| km * scale)).collect();
+            shape.sheets.push(SheetParameters { points: Some(points), ..SheetParameters::default() });
+        }
+        shapes.push(shape);
+    }
+    shapes
 }

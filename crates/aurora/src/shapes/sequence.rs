@@ -94,33 +94,32 @@ impl Sequence {
         let shapes = if shapes.is_empty() { &default_shapes[..] } else { shapes };
         let timing = timing(shapes)?;
         let drawn = drawn_shapes(shapes, extent_km, assets)?;
-        let sequence = |evenness: f64| {
+        let mut best = Self {
+            tracked: TrackedControlPoints::default(),
+            timing,
+            half_km: extent_km / 2.0,
+            gap_light: morphing.gap_light,
+            crossing: None,
+            loop_s: None,
+        };
+        let mut fewest_crossings = usize::MAX;
+        // The weight matters only where points are matched automatically.
+        let is_automatic = morphing.correspondence == Correspondence::Automatic;
+        for &evenness in if is_automatic { &EVENNESS[..] } else { &EVENNESS[..1] } {
             let mut tracked = track_control_points(shapes, &drawn, morphing, extent_km, evenness)?;
             let closed = loop_s.is_some() && tracked.is_closed;
-            find_velocities(&mut tracked.tracks, &timing, closed);
-            let sequence = Self {
-                tracked,
-                timing: timing.clone(),
-                half_km: extent_km / 2.0,
-                gap_light: morphing.gap_light,
-                crossing: None,
-                loop_s: None,
-            };
-            Ok((sequence.crossings(), sequence))
-        };
-        let mut best = sequence(EVENNESS[0])?;
-        let by_position = morphing.correspondence == Correspondence::Automatic;
-        for &evenness in EVENNESS[1..].iter().filter(|_| by_position) {
-            if best.0 == 0 {
+            find_velocities(&mut tracked.tracks, &best.timing, closed);
+            let candidate = Self { tracked, timing: best.timing.clone(), ..best };
+            let crossings = candidate.crossings();
+            if crossings < fewest_crossings {
+                (best, fewest_crossings) = (candidate, crossings);
+            }
+            if fewest_crossings == 0 {
                 break;
             }
-            let other = sequence(evenness)?;
-            if other.0 < best.0 {
-                best = other;
-            }
         }
-        let crossing = best.1.first_crossing();
-        Ok(Self { loop_s, crossing, ..best.1 })
+        let crossing = best.first_crossing();
+        Ok(Self { loop_s, crossing, ..best })
     }
 
     /// Arrival time of each key shape, s, without a loop.
@@ -141,8 +140,9 @@ impl Sequence {
             }
             SequencePosition::Between(index, fraction) => (index, fraction),
         };
-        let between = |track: usize| self.tracked.tracks[track].between(index, fraction, &self.timing);
-        let mut shape = self.shape(&self.tracked.strands[index], between);
+        let mut shape = self.shape(&self.tracked.strands[index], |track| {
+            self.tracked.tracks[track].between(index, fraction, &self.timing)
+        });
         let faded: &[Gap] = if self.gap_light == GapLight::Faded { &self.tracked.gaps[index] } else { &[] };
         for gap in faded {
             let (state, _) = self.gap(gap, index, fraction);
@@ -169,14 +169,16 @@ impl Sequence {
         if self.gap_light == GapLight::Full {
             return Vec::new();
         }
-        let bridge = |gap: &Gap| {
-            let (state, knots) = self.gap(gap, index, fraction);
-            let ends = [self.end(gap.ends[0], index)?, self.end(gap.ends[1], index)?];
-            let mean = |value: usize| 0.5 * (knots[0].factors[value] + knots[1].factors[value]);
-            let bridge = Bridge { ends, flux: mean(0) * state.across, energy: mean(1) };
-            (bridge.flux > 0.0).then_some(bridge)
-        };
-        self.tracked.gaps[index].iter().filter_map(bridge).collect()
+        self.tracked.gaps[index].iter().filter_map(|gap| self.bridge(gap, index, fraction)).collect()
+    }
+
+    /// The bridge over a gap in the transition from shape `index`, with the mean flux and energy of its ends; `None` if no light crosses it.
+    fn bridge(&self, gap: &Gap, index: usize, fraction: f64) -> Option<Bridge> {
+        let (state, knots) = self.gap(gap, index, fraction);
+        let ends = [self.end(gap.ends[0], index)?, self.end(gap.ends[1], index)?];
+        let [flux, energy] = [0, 1].map(|value| 0.5 * (knots[0].factors[value] + knots[1].factors[value]));
+        let bridge = Bridge { ends, flux: flux * state.across, energy };
+        (bridge.flux > 0.0).then_some(bridge)
     }
 
     /// Position of a time within the sequence.
@@ -194,11 +196,11 @@ impl Sequence {
     /// State of a gap in the transition from shape `index`, and its two ends.
     fn gap(&self, gap: &Gap, index: usize, fraction: f64) -> (GapFlux, [Knot; 2]) {
         let tracks = gap.ends.map(|track| &self.tracked.tracks[track]);
-        let width = |[a, b]: [Knot; 2]| a.position.distance(b.position);
         let now = tracks.map(|track| track.between(index, fraction, &self.timing));
         let widest = tracks.map(|track| track.knot(index + usize::from(gap.opens)));
+        let [width, max_width] = [now, widest].map(|[a, b]| a.position.distance(b.position));
         let from_closed = if gap.opens { fraction } else { 1.0 - fraction };
-        (GapFlux::new(width(now), width(widest), from_closed), now)
+        (GapFlux::new(width, max_width, from_closed), now)
     }
 
     /// The end of a strand in the transition from shape `index` at which this control point is.
@@ -214,20 +216,26 @@ impl Sequence {
     /// Start and end positions of all control points in the transition from shape `index`, km, by strand: a splitting
     /// sheet has two strands, two merging sheets are still two. Empty for the last shape.
     pub fn control_point_paths(&self, index: usize) -> Vec<Vec<[DVec2; 2]>> {
-        let path = |&track: &usize| [index, index + 1].map(|knot| self.tracked.tracks[track].knot(knot).position);
-        let strands = self.tracked.strands.get(index).into_iter().flatten();
-        strands.map(|strand| strand.iter().map(path).collect()).collect()
+        let mut paths = Vec::new();
+        for strand in self.tracked.strands.get(index).into_iter().flatten() {
+            let tracks = strand.iter().map(|&track| &self.tracked.tracks[track]);
+            paths.push(tracks.map(|track| [index, index + 1].map(|knot| track.knot(knot).position)).collect());
+        }
+        paths
     }
 
     /// Times at which transitions are checked for crossings, s, each with the index of the previous shape.
     fn checked_times(&self) -> Vec<(usize, f64)> {
         let ShapeTiming { arrivals, departures } = &self.timing;
-        let of_transition = |index: usize| {
+        let mut times = Vec::with_capacity((arrivals.len() - 1) * CHECKED_TIMES);
+        for index in 0..arrivals.len() - 1 {
             let span = arrivals[index + 1] - departures[index];
-            let fraction = |check: usize| (check as f64 + 0.5) / CHECKED_TIMES as f64;
-            (0..CHECKED_TIMES).map(move |check| (index, departures[index] + fraction(check) * span))
-        };
-        (0..arrivals.len() - 1).flat_map(of_transition).collect()
+            for check in 0..CHECKED_TIMES {
+                let fraction = (check as f64 + 0.5) / CHECKED_TIMES as f64;
+                times.push((index, departures[index] + fraction * span));
+            }
+        }
+        times
     }
 
     /// Total number of crossings at these times.
@@ -271,18 +279,21 @@ impl Sequence {
         }
     }
 
+    /// The shape whose sheets have these tracks, each at the state `knot(track)`, within the drawn square.
     fn shape(&self, sheets: &[Vec<usize>], knot: impl Fn(usize) -> Knot) -> Shape {
         let half = DVec2::splat(self.half_km);
-        let sheet = |tracks: &Vec<usize>| {
+        let mut shape = Shape::default();
+        for tracks in sheets {
             let mut sheet = Sheet::default();
-            for knot in tracks.iter().map(|&track| knot(track)) {
-                sheet.points.push(knot.position.clamp(-half, half));
-                sheet.flux.push(knot.factors[0]);
-                sheet.energy.push(knot.factors[1]);
+            for &track in tracks {
+                let Knot { position, factors: [flux, energy] } = knot(track);
+                sheet.points.push(position.clamp(-half, half));
+                sheet.flux.push(flux);
+                sheet.energy.push(energy);
             }
-            sheet
-        };
-        Shape { sheets: sheets.iter().map(sheet).collect() }
+            shape.sheets.push(sheet);
+        }
+        shape
     }
 }
 
@@ -290,26 +301,35 @@ impl Sequence {
 fn timing(shapes: &[ShapeParameters]) -> Result<ShapeTiming, ShapeError> {
     let mut timing = ShapeTiming { arrivals: Vec::new(), departures: Vec::new() };
     for (index, shape) in shapes.iter().enumerate() {
-        let error = |key: &str, kind| ShapeError { key: format!("shapes.{index}.{key}"), kind };
         let after = match (shape.transition_s, shape.transition_frames) {
-            (Some(_), Some(_)) => return Err(error("transition_frames", ShapeErrorKind::SecondsAndFrames)),
+            (Some(_), Some(_)) => {
+                return Err(ShapeError::in_shape(index, "transition_frames", ShapeErrorKind::SecondsAndFrames));
+            }
             (Some(seconds), None) => seconds,
             (None, Some(frames)) => frames * FRAME_S,
             (None, None) => TRANSITION_S,
         };
-        let times =
-            [("transition_s", shape.transition_s.is_none()), ("transition_frames", shape.transition_frames.is_none())];
-        if let Some((key, _)) = times.into_iter().find(|(_, none)| index == 0 && !none) {
-            return Err(error(key, ShapeErrorKind::TimeBeforeFirstShape));
-        }
-        let changes =
-            [("split", shape.split.is_empty()), ("merge", shape.merge.is_empty()), ("link", shape.link.is_empty())];
-        if let Some((key, _)) = changes.into_iter().find(|(_, none)| index == 0 && !none) {
-            return Err(error(key, ShapeErrorKind::ChangeBeforeFirstShape));
+        if index == 0 {
+            check_first_shape(shape)?;
         }
         let arrival = timing.departures.last().map_or(0.0, |departure| departure + after);
         timing.arrivals.push(arrival);
         timing.departures.push(arrival + shape.hold_s);
     }
     Ok(timing)
+}
+
+/// Checks that the first shape has nothing of a transition, since there is no shape before it.
+fn check_first_shape(shape: &ShapeParameters) -> Result<(), ShapeError> {
+    let times =
+        [("transition_s", shape.transition_s.is_some()), ("transition_frames", shape.transition_frames.is_some())];
+    if let Some((key, _)) = times.into_iter().find(|(_, is_set)| *is_set) {
+        return Err(ShapeError::in_shape(0, key, ShapeErrorKind::TimeBeforeFirstShape));
+    }
+    let changes =
+        [("split", shape.split.is_empty()), ("merge", shape.merge.is_empty()), ("link", shape.link.is_empty())];
+    if let Some((key, _)) = changes.into_iter().find(|(_, is_empty)| !is_empty) {
+        return Err(ShapeError::in_shape(0, key, ShapeErrorKind::ChangeBeforeFirstShape));
+    }
+    Ok(())
 }

@@ -2,6 +2,8 @@
 
 use bansho_base::math::DVec2;
 
+use super::line_length;
+
 /// One sheet: control points joined by segments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
@@ -29,8 +31,7 @@ pub struct Shape {
 impl Shape {
     /// Length of all sheets together, km.
     pub fn length(&self) -> f64 {
-        let length = |sheet: &Sheet| sheet.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
-        self.sheets.iter().map(length).sum()
+        self.sheets.iter().map(|sheet| line_length(&sheet.points)).sum()
     }
 }
 

@@ -98,16 +98,14 @@ impl EnergyFlux {
         }
         let lengths = refined.sheet_lengths();
         let [coarse, fine] = self.layouts(&lengths);
-        let weight_chunk = |chunk| self.weight_chunk(chunk, refined, &fine, rays, time);
+        let tasks = chunks(particles).into_par_iter().with_max_len(1);
         let weighted: Vec<WeightedChunk> =
-            chunks(particles).into_par_iter().with_max_len(1).map(weight_chunk).collect();
+            tasks.map(|chunk| self.weight_chunk(chunk, refined, &fine, rays, time)).collect();
         let counts = weighted.iter().fold(NodeValues::new(&fine), |sum, chunk| sum.plus(&chunk.counts));
         let lengths = NodeValues::of_lengths(&fine, &lengths).distributed_by(&counts, MAX_CONCENTRATION);
-        let accumulate_weights = |(chunk, weighted): (ParticleChunk, &WeightedChunk)| {
-            chunk.accumulate_weights(&weighted.weights, &lengths, &coarse)
-        };
+        let tasks = chunks(particles).into_par_iter().with_max_len(1).zip(&weighted);
         let weights: Vec<_> =
-            chunks(particles).into_par_iter().with_max_len(1).zip(&weighted).map(accumulate_weights).collect();
+            tasks.map(|(chunk, weighted)| chunk.accumulate_weights(&weighted.weights, &lengths, &coarse)).collect();
         let weights = weights.iter().fold(NodeValues::new(&coarse), |sum, chunk| sum.plus(chunk));
         let factors = self.target_power(refined, &coarse, time).distributed_by(&weights, MAX_CONCENTRATION);
         let totals: Vec<[f64; 2]> =
@@ -242,16 +240,14 @@ fn chunks(particles: &mut AuroraParticles) -> Vec<ParticleChunk<'_>> {
     let powers = particles.powers_w.chunks_mut(TASK).zip(particles.full_powers_w.chunks_mut(TASK));
     let light = particles.energies_ev.chunks_mut(TASK).zip(powers);
     let inputs = particles.arc_fractions.chunks_mut(TASK).zip(particles.sheets.chunks_mut(TASK));
-    let chunk = |(((xs, zs), fades), ((energies, (powers, full_powers)), (arc_fractions, sheets)))| ParticleChunk {
-        positions: [xs, zs],
-        fades,
-        energies,
-        powers,
-        full_powers,
-        arc_fractions,
-        sheets,
-    };
-    reads.zip(light.zip(inputs)).map(chunk).collect()
+    let mut chunks = Vec::with_capacity(xs.len().div_ceil(TASK));
+    for (((xs, zs), fades), ((energies, (powers, full_powers)), (arc_fractions, sheets))) in
+        reads.zip(light.zip(inputs))
+    {
+        let positions = [xs, zs];
+        chunks.push(ParticleChunk { positions, fades, energies, powers, full_powers, arc_fractions, sheets });
+    }
+    chunks
 }
 
 #[cfg(test)]

@@ -72,16 +72,19 @@ impl NeighborCells {
     pub(super) fn assign(&mut self, positions: &[Vec<f32>; 2], masses: &[f32], support: f32) {
         self.support = support;
         let per_km = self.reach / support;
-        let cell = |value: &f32| (value * per_km).floor() as i64;
-        // Cells are aligned at the origin, as those of the field; one empty cell on each side.
-        let bounds = positions.each_ref().map(|values| {
-            let first = values.iter().map(cell).min().unwrap_or(0) - 1;
-            [first, values.iter().map(cell).max().unwrap_or(0) + 1]
+        // Column or row of each particle: cells are aligned at the origin, as those of the field.
+        let [columns, rows]: [Vec<i64>; 2] =
+            positions.each_ref().map(|values| values.iter().map(|value| (value * per_km).floor() as i64).collect());
+        // One empty cell on each side.
+        let bounds = [&columns, &rows].map(|indices| {
+            let (first, last) = (indices.iter().min(), indices.iter().max());
+            [first.copied().unwrap_or(0) - 1, last.copied().unwrap_or(0) + 1]
         });
         self.size = bounds.map(|[first, last]| (last - first + 1) as usize);
-        let cell_of =
-            |(x, z): (&f32, &f32)| (cell(z) - bounds[1][0]) as usize * self.size[0] + (cell(x) - bounds[0][0]) as usize;
-        let cells: Vec<usize> = positions[0].iter().zip(&positions[1]).map(cell_of).collect();
+        let mut cells = Vec::with_capacity(columns.len());
+        for (column, row) in columns.iter().zip(&rows) {
+            cells.push((row - bounds[1][0]) as usize * self.size[0] + (column - bounds[0][0]) as usize);
+        }
         self.starts.clear();
         self.starts.resize(self.size[0] * self.size[1] + 1, 0);
         cells.iter().for_each(|cell| self.starts[cell + 1] += 1);
@@ -94,9 +97,13 @@ impl NeighborCells {
             self.order[next[*cell] as usize] = index as u32;
             next[*cell] += 1;
         }
-        let sorted = |values: &[f32]| self.order.iter().map(|index| values[*index as usize]).collect();
-        self.positions = positions.each_ref().map(|values| sorted(values));
-        self.masses = sorted(masses);
+        self.positions = positions.each_ref().map(|values| self.in_cell_order(values));
+        self.masses = self.in_cell_order(masses);
+    }
+
+    /// Values of the particles of [`Self::assign`], sorted by cell.
+    fn in_cell_order(&self, values: &[f32]) -> Vec<f32> {
+        self.order.iter().map(|index| values[*index as usize]).collect()
     }
 
     /// Densities (2.11), in the order of the particles of [`Self::assign`].
@@ -121,8 +128,7 @@ impl NeighborCells {
         pressures: &[f32],
         accelerations: &mut [Vec<f32>; 2],
     ) {
-        let sorted = |values: &[f32]| self.order.iter().map(|index| values[*index as usize]).collect::<Vec<_>>();
-        let (own, sorted_densities) = (sorted(pressures), sorted(densities));
+        let (own, sorted_densities) = (self.in_cell_order(pressures), self.in_cell_order(densities));
         let volumes: Vec<f32> =
             self.masses.iter().zip(&sorted_densities).map(|(mass, density)| mass / density).collect();
         let values = [own.as_slice(), &volumes];
@@ -144,15 +150,18 @@ impl NeighborCells {
     /// Sums of all particles, in sorted order; `own` and `others` are sorted too.
     fn sum<T: CellTerm>(&self, term: &T, own: &[f32], others: [&[f32]; 2]) -> Vec<[f32; 2]> {
         let (columns, level) = (self.size[0], bansho_base::math::simd::level());
-        let of_cell = |cell: usize| {
-            let mut sums = [Vec::new(), Vec::new()];
-            dispatch!(level, _simd => self.sum_cell(term, cell, columns, own, others, &mut sums));
-            let [first, second] = sums;
-            first.into_iter().zip(second).map(|(first, second)| [first, second]).collect::<Vec<_>>()
-        };
         let occupied = (0..self.starts.len() - 1).filter(|cell| self.starts[*cell] < self.starts[cell + 1]);
         let occupied: Vec<usize> = occupied.collect();
-        occupied.into_par_iter().with_max_len(1).flat_map_iter(of_cell).collect()
+        occupied
+            .into_par_iter()
+            .with_max_len(1)
+            .flat_map_iter(|cell| {
+                let mut sums = [Vec::new(), Vec::new()];
+                dispatch!(level, _simd => self.sum_cell(term, cell, columns, own, others, &mut sums));
+                let [first, second] = sums;
+                first.into_iter().zip(second).map(|(first, second)| [first, second])
+            })
+            .collect()
     }
 
     /// Sums of the particles of a cell: for each neighbor a loop over them, which vectorizes.
@@ -174,6 +183,7 @@ impl NeighborCells {
         first.resize(xs.len(), 0.0);
         second.resize(xs.len(), 0.0);
         let (first, second) = (&mut first[..xs.len()], &mut second[..xs.len()]);
+        // The three cells of a row are adjacent in memory, and the border of empty cells has neighbors for all others.
         for row in [cell - columns, cell, cell + columns] {
             for j in self.starts[row - 1] as usize..self.starts[row + 2] as usize {
                 let (x, z) = (self.positions[0][j], self.positions[1][j]);
@@ -181,6 +191,8 @@ impl NeighborCells {
                 for i in 0..xs.len() {
                     let offset = [xs[i] - x, zs[i] - z];
                     let squared = offset[0].fma(offset[0], offset[1] * offset[1]);
+                    // Clamped instead of skipped, so that the loop has no branches: the kernels are 0 at the support radius, and the
+                    // factor of the gradient need not be finite at 0.
                     let squared = if squared < max { squared } else { max };
                     let squared = if squared > min { squared } else { min };
                     [first[i], second[i]] = term.add(offset, squared, own[i], other, [first[i], second[i]]);

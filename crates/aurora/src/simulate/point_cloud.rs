@@ -16,25 +16,30 @@ const MOMENT_S: f64 = 1e-3;
 /// camera.
 pub(crate) fn point_cloud(particles: &AuroraParticles, offset_s: f64, origin: [f64; 3]) -> PointCloud {
     let offset_s = offset_s.clamp(-AuroraSimulation::STEP_S, AuroraSimulation::STEP_S);
-    let [us, ws] = &particles.velocities;
-    let position_at = |index: usize, time: f64| {
-        let velocity = DVec2::new(f64::from(us[index]), f64::from(ws[index]));
-        on_shell(particles.position(index) + velocity * time)
-    };
-    let velocity = |index: usize| (position_at(index, MOMENT_S) - position_at(index, -MOMENT_S)) / (2.0 * MOMENT_S);
-    let positions = (0..particles.len()).map(|index| position_at(index, offset_s).to_array());
-    let velocities = (0..particles.len()).map(|index| velocity(index).as_vec3().to_array()).collect();
+    let (mut positions, mut velocities) = (Vec::new(), Vec::new());
+    for index in 0..particles.len() {
+        positions.push(position_at(particles, index, offset_s).to_array());
+        // The velocity follows the shell.
+        let [before, after] = [-MOMENT_S, MOMENT_S].map(|time| position_at(particles, index, time));
+        velocities.push(((after - before) / (2.0 * MOMENT_S)).as_vec3().to_array());
+    }
     let quantities = [(Quantity::Energy, &particles.energies_ev), (Quantity::Power, &particles.powers_w)]
         .map(|(quantity, values)| (quantity, values.clone()));
-    PointCloud::new(origin, positions, velocities, quantities.into())
+    PointCloud::new(origin, positions.into_iter(), velocities, quantities.into())
+}
+
+/// Position of a particle on the shell `time` seconds after its step, m.
+fn position_at(particles: &AuroraParticles, index: usize, time: f64) -> DVec3 {
+    let [east, south] = [0, 1].map(|axis| f64::from(particles.velocities[axis][index]));
+    on_shell(particles.position(index) + DVec2::new(east, south) * time)
 }
 
 /// Maps a position of the drawn plane, km, to the spherical shell at 100 km, m.
-fn on_shell(position_at: DVec2) -> DVec3 {
+fn on_shell(position: DVec2) -> DVec3 {
     const SHELL_M: f64 = 1e3 * (EARTH_RADIUS_KM + FOOT_ALTITUDE_KM);
-    let distance = position_at.length();
+    let distance = position.length();
     let (sin, cos) = math::sin_cos(1e3 * distance / SHELL_M);
-    let horizontal = position_at.normalize_or_zero() * (sin * SHELL_M);
+    let horizontal = position.normalize_or_zero() * (sin * SHELL_M);
     DVec3::new(horizontal.x, cos * SHELL_M - 1e3 * EARTH_RADIUS_KM, horizontal.y)
 }
 

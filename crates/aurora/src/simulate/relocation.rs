@@ -97,12 +97,13 @@ impl Relocation {
     /// applied literally.
     fn coverage(&self, field: &ElectricField, near: &[bool]) -> Vec<f64> {
         let full = full_cell_count(&field.counts).max(f64::MIN_POSITIVE);
-        let fraction = |(count, near): (&f64, &bool)| match (near, self.parameters.scale_counts) {
-            (false, _) => 0.0,
-            (true, false) => 1.0,
-            (true, true) => (count / full).min(1.0),
-        };
-        field.counts.values().iter().zip(near).map(fraction).collect()
+        let mut coverage = vec![0.0; near.len()];
+        for ((fraction, count), _) in
+            coverage.iter_mut().zip(field.counts.values()).zip(near).filter(|(_, near)| **near)
+        {
+            *fraction = if self.parameters.scale_counts { (count / full).min(1.0) } else { 1.0 };
+        }
+        coverage
     }
 
     /// Scale factor of the table's counts.
@@ -126,10 +127,15 @@ impl Relocation {
             if excess < 1.0 {
                 continue;
             }
-            let distance = |index: u32| refined.distance(particles.position(index as usize)).unwrap_or(f64::INFINITY);
-            let mut farthest: Vec<(f64, u32)> = list.iter().map(|index| (distance(*index), *index)).collect();
+            let mut farthest = Vec::with_capacity(list.len());
+            for index in list {
+                let distance = refined.distance(particles.position(*index as usize)).unwrap_or(f64::INFINITY);
+                farthest.push((distance, *index));
+            }
             farthest.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            farthest.iter().take(excess as usize).for_each(|entry| particles.dying[entry.1 as usize] = true);
+            for (_, index) in farthest.into_iter().take(excess as usize) {
+                particles.dying[index as usize] = true;
+            }
         }
     }
 
@@ -177,18 +183,21 @@ impl Relocation {
     ) -> Vec<Birth> {
         let [births_below, max_births] =
             [self.parameters.births_below, self.parameters.max_births].map(|count| count / TABLE_COUNT);
-        let deficit =
-            |interval: &ArcInterval| (FILL_FACTOR * births_below * interval.target_count - interval.count).max(0.0);
-        let deficits: Vec<f64> = intervals.all().iter().map(deficit).collect();
+        let mut deficits = Vec::new();
+        for interval in intervals.all() {
+            deficits.push((FILL_FACTOR * births_below * interval.target_count - interval.count).max(0.0));
+        }
         let total_deficit: f64 = deficits.iter().sum();
         if total_deficit <= 0.0 {
             return Vec::new();
         }
         let filled_fraction =
             (max_births * self.count).min(self.remaining_capacity(living)).min(total_deficit) / total_deficit;
-        let probability =
-            |(deficit, interval): (&f64, &mut ArcInterval)| filled_fraction * deficit / interval.scattered.max(1.0);
-        let probabilities: Vec<f64> = deficits.iter().zip(intervals.all()).map(probability).collect();
+        // Each scattered particle of an interval is a candidate.
+        let mut probabilities = Vec::with_capacity(deficits.len());
+        for (deficit, interval) in deficits.iter().zip(intervals.all()) {
+            probabilities.push(filled_fraction * deficit / interval.scattered.max(1.0));
+        }
         let velocities: Vec<[f32; 2]> = (0..probabilities.len()).map(|index| intervals.velocity(index)).collect();
         let mut births = Vec::new();
         for (number, particle) in scattered.iter().enumerate() {
@@ -213,15 +222,16 @@ impl Relocation {
     /// Removes the surplus over the requested count, from intervals with more than their target.
     fn remove_surplus(&self, particles: &mut AuroraParticles, intervals: &mut ArcIntervals, update_index: u32) {
         let living: f64 = intervals.all().iter().map(|interval| interval.count).sum();
-        let excess = |interval: &ArcInterval| (interval.count - interval.target_count).max(0.0);
-        let excesses: Vec<f64> = intervals.all().iter().map(excess).collect();
+        let excesses: Vec<f64> =
+            intervals.all().iter().map(|interval| (interval.count - interval.target_count).max(0.0)).collect();
         let fraction = (living - self.count) / excesses.iter().sum::<f64>().max(1.0);
         if fraction <= 0.0 {
             return;
         }
-        let probability =
-            |(excess, interval): (&f64, &mut ArcInterval)| (fraction * excess / interval.count.max(1.0)) as f32;
-        let probabilities: Vec<f32> = excesses.iter().zip(intervals.all()).map(probability).collect();
+        let mut probabilities = Vec::with_capacity(excesses.len());
+        for (excess, interval) in excesses.iter().zip(intervals.all()) {
+            probabilities.push((fraction * excess / interval.count.max(1.0)) as f32);
+        }
         for (index, dying) in particles.dying.iter_mut().enumerate().filter(|(_, dying)| !**dying) {
             let Some(interval) = intervals.index(particles.sheets[index], particles.arc_fractions[index]) else {
                 continue;
@@ -240,9 +250,12 @@ const MAX_PARTICLE_FACTOR: f64 = 4.0;
 pub(super) fn near_cells(field: &ElectricField, table: &RelocationParameters) -> Vec<bool> {
     let counts = field.counts.values();
     let min_count = table.scatter_count_threshold * mean(counts);
-    // An empty shape has no near cells, whatever the thresholds.
-    let near = |(count, is_low): (&f64, bool)| *count > 0.0 && *count >= min_count && is_low;
-    counts.iter().zip(cells_of_low_potential(field, table)).map(near).collect()
+    let mut near = cells_of_low_potential(field, table);
+    for (near, count) in near.iter_mut().zip(counts) {
+        // An empty shape has no near cells, whatever the thresholds.
+        *near &= *count > 0.0 && *count >= min_count;
+    }
+    near
 }
 
 /// Cells whose potential is low enough to be near the shape.
@@ -263,15 +276,21 @@ fn cell_of_particle(particles: &AuroraParticles, field: &ElectricField, index: u
 
 impl CellOccupants {
     fn new(particles: &AuroraParticles, cells_of: &[Option<usize>], cells: usize) -> Self {
-        let live = || cells_of.iter().enumerate().filter(|(index, _)| !particles.dying[*index]);
+        let mut located = Vec::with_capacity(particles.len());
+        for (index, cell) in cells_of.iter().enumerate().filter(|(index, _)| !particles.dying[*index]) {
+            located.extend(cell.map(|cell| (index, cell)));
+        }
+        // A counting sort by cell, in the order of the particles.
         let mut starts = vec![0_u32; cells + 1];
-        live().filter_map(|(_, cell)| *cell).for_each(|cell| starts[cell + 1] += 1);
+        for (_, cell) in &located {
+            starts[cell + 1] += 1;
+        }
         for cell in 0..cells {
             starts[cell + 1] += starts[cell];
         }
         let mut ends = starts.clone();
-        let mut indices = vec![0; starts[cells] as usize];
-        for (index, cell) in live().filter_map(|(index, cell)| Some((index, (*cell)?))) {
+        let mut indices = vec![0; located.len()];
+        for (index, cell) in located {
             indices[ends[cell] as usize] = index as u32;
             ends[cell] += 1;
         }
@@ -297,10 +316,9 @@ impl CellOccupants {
 
 /// The 3 x 3 cells around a cell of a grid with `columns` columns.
 fn cells_around(cell: usize, columns: usize, cells: usize) -> impl Iterator<Item = usize> {
-    let around = |position: usize, count: usize| position.saturating_sub(1)..(position + 2).min(count);
-    let across = around(cell % columns, columns);
-    around(cell / columns, cells / columns)
-        .flat_map(move |row| across.clone().map(move |column| row * columns + column))
+    let [across, along] = [(cell % columns, columns), (cell / columns, cells / columns)]
+        .map(|(position, count)| position.saturating_sub(1)..(position + 2).min(count));
+    along.flat_map(move |row| across.clone().map(move |column| row * columns + column))
 }
 
 /// Number of intervals of all sheets: half as long as those for which half the target density is guaranteed.

@@ -129,10 +129,6 @@ impl SimulationState {
 
     /// Whether numbers are finite and counts within range.
     fn is_valid(&self) -> bool {
-        let is_finite = |arc_map: &ArcLengthMap| {
-            arc_map.coordinates.iter().flatten().all(|coordinate| coordinate.is_finite())
-                && arc_map.points.iter().flatten().all(|point| point.is_finite())
-        };
         let arrays = self.particles.float_arrays();
         [self.steps, self.next_id].iter().all(|count| *count < MAX_EXACT_COUNT)
             && u64::from(self.target_updates) <= self.steps
@@ -144,6 +140,12 @@ impl SimulationState {
             && is_finite(&self.target_arc_map)
             && arrays.iter().all(|values| values.iter().all(|value| value.is_finite()))
     }
+}
+
+/// Whether all coordinates and points of a map are finite.
+fn is_finite(arc_map: &ArcLengthMap) -> bool {
+    arc_map.coordinates.iter().flatten().all(|coordinate| coordinate.is_finite())
+        && arc_map.points.iter().flatten().all(|point| point.is_finite())
 }
 
 fn write_arc_map(bytes: &mut Vec<u8>, arc_map: &ArcLengthMap) {

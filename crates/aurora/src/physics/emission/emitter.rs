@@ -157,13 +157,17 @@ fn absolute_xyz(wavelength_nm: f64) -> [f64; 3] {
     line_xyz(wavelength_nm).map(|value| LUMINOUS_EFFICACY_LM_PER_W * radiance * value)
 }
 
+/// Columns 2 and 4 of each row of the table: wavelength, nm, and photons.
 fn first_positive_bands() -> Vec<(f64, f64)> {
-    let rows = FIRST_POSITIVE_TEXT.lines().skip(1).map(|row| {
+    let mut bands = Vec::new();
+    for row in FIRST_POSITIVE_TEXT.lines().skip(1) {
+        let fields: Vec<&str> = row.split(',').collect();
         // The table is compiled in and a test parses every field, so NaN cannot occur.
-        let field = |column| row.split(',').nth(column).and_then(|field| field.parse().ok()).unwrap_or(f64::NAN);
-        (field(2), field(4))
-    });
-    rows.collect()
+        let [wavelength_nm, photons] =
+            [2, 4].map(|column| fields.get(column).and_then(|field| field.parse().ok()).unwrap_or(f64::NAN));
+        bands.push((wavelength_nm, photons));
+    }
+    bands
 }
 
 #[cfg(test)]

@@ -22,8 +22,7 @@ const RGB_FROM_XYZ: Matrix3 =
 /// where the line lies outside sRGB.
 #[must_use]
 pub(crate) fn srgb(wavelength_nm: f64, radiance: f64) -> [f64; 3] {
-    let distance = |(nm, _): &(f64, [f64; 3])| (nm - wavelength_nm).abs();
-    let nearest = XYZ.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let nearest = XYZ.iter().min_by(|(a, _), (b, _)| (a - wavelength_nm).abs().total_cmp(&(b - wavelength_nm).abs()));
     let xyz = nearest.map_or([0.0; 3], |(_, xyz)| xyz.map(|value| LUMINOUS_EFFICACY_LM_PER_W * radiance * value));
     RGB_FROM_XYZ.apply(xyz)
 }

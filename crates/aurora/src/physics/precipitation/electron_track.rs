@@ -115,11 +115,10 @@ impl TrackSampler {
     /// One of the [`TRACKS_PER_ENERGY`] tracks of a node. Each samples another substratum of every stratum, in a permutation
     /// that differs between collisions.
     fn stratified_track(&self, node: usize, variant: u32, key: Key) -> impl Iterator<Item = Collision> {
-        let quantile = move |number: u32, uniform: f64| {
+        self.track_with(node, key, (node as u64) << 32 | variant as u64, move |number, uniform| {
             let substratum = variant ^ (key.words(node as u64, number, TRACK_VARIANT)[0] % TRACKS_PER_ENERGY);
             (substratum as f64 + uniform) / TRACKS_PER_ENERGY as f64
-        };
-        self.track_with(node, key, (node as u64) << 32 | variant as u64, quantile)
+        })
     }
 }
 

@@ -56,15 +56,16 @@ impl MonoenergeticBeam {
     #[must_use]
     pub fn new(energy_ev: f64) -> Self {
         let ln_energy = math::ln(energy_ev / 1000.0);
-        let cubic = |[a, b, c, d]: [f64; 4]| ((d * ln_energy + c) * ln_energy + b) * ln_energy + a;
-        Self { ln_energy, coefficients: COEFFICIENTS.map(|row| math::exp(cubic(row))) }
+        // Equation (5): a cubic of the logarithm of the energy in keV.
+        let coefficients =
+            COEFFICIENTS.map(|[a, b, c, d]| math::exp(((d * ln_energy + c) * ln_energy + b) * ln_energy + a));
+        Self { ln_energy, coefficients }
     }
 
     /// Normalized energy dissipation f(y) of equations (3) and (4), from ln y.
     fn dissipation_fraction(&self, ln_y: f64) -> f64 {
         let [c1, c2, c3, c4, c5, c6, c7, c8] = self.coefficients;
-        let term = |a, b, c, d| a * math::exp(b * ln_y - c * math::exp(d * ln_y));
-        term(c1, c2, c3, c4) + term(c5, c6, c7, c8)
+        dissipation_term([c1, c2, c3, c4], ln_y) + dissipation_term([c5, c6, c7, c8], ln_y)
     }
 
     /// Ionization rate, m^-3 s^-1 per mW m^-2 of incident energy flux (2).
@@ -73,6 +74,11 @@ impl MonoenergeticBeam {
         let ln_y = std::f64::consts::LN_2 - self.ln_energy + layer.ln_column;
         self.dissipation_fraction(ln_y) * layer.pairs_at_unit_dissipation
     }
+}
+
+/// One of the two terms of f(y), equation (4), from ln y: `a y^b exp(-c y^d)`.
+fn dissipation_term([a, b, c, d]: [f64; 4], ln_y: f64) -> f64 {
+    a * math::exp(b * ln_y - c * math::exp(d * ln_y))
 }
 
 #[cfg(test)]

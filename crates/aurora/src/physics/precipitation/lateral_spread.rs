@@ -82,12 +82,14 @@ impl Tracks {
 /// From the altitudes, in km, of the collisions of a track of a node, sampled with a key and a particle number.
 fn spread_by_node(track_altitudes_km: impl Fn(usize, Key, u64) -> Vec<f64> + Sync) -> Vec<f64> {
     let key = Key::new(0, "aurora wander");
-    let of_node = |node: usize| {
-        let tracks = u64::from(COLLISIONS_PER_ENERGY.div_ceil(collision_count(node)).max(MIN_TRACKS));
-        let sum = (0..tracks).map(|particle| variance_km2(&track_altitudes_km(node, key, particle))).sum::<f64>();
-        math::sqrt(sum / tracks as f64)
-    };
-    (0..NODES).into_par_iter().step_by(STRIDE).map(of_node).collect()
+    let nodes = (0..NODES).into_par_iter().step_by(STRIDE);
+    nodes
+        .map(|node| {
+            let tracks = u64::from(COLLISIONS_PER_ENERGY.div_ceil(collision_count(node)).max(MIN_TRACKS));
+            let sum = (0..tracks).map(|particle| variance_km2(&track_altitudes_km(node, key, particle))).sum::<f64>();
+            math::sqrt(sum / tracks as f64)
+        })
+        .collect()
 }
 
 fn altitudes_km(track: impl Iterator<Item = Collision>) -> Vec<f64> {

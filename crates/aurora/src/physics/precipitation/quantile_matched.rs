@@ -30,9 +30,11 @@ impl QuantileMatchedTracks {
     /// If the node is not in the grid.
     #[must_use]
     pub fn new(spheres: &HardSphereAtmosphere, sampler: &TrackSampler, node: usize, key: Key) -> Self {
-        let track =
-            |variant| spheres.track(node_energy_ev(node), key, (node as u64) << 32 | u64::from(variant)).collect();
-        let mut tracks: Vec<Vec<Collision>> = (0..TRACKS_PER_ENERGY).map(track).collect();
+        let mut tracks: Vec<Vec<Collision>> = Vec::with_capacity(TRACKS_PER_ENERGY as usize);
+        for variant in 0..TRACKS_PER_ENERGY {
+            let particle = (node as u64) << 32 | u64::from(variant);
+            tracks.push(spheres.track(node_energy_ev(node), key, particle).collect());
+        }
         // A stable sort keeps the order within a track where altitudes are equal.
         let mut order: Vec<&mut Collision> = tracks.iter_mut().flatten().collect();
         order.sort_by(|a, b| b.altitude_km.total_cmp(&a.altitude_km));

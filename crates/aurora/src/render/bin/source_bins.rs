@@ -227,12 +227,14 @@ impl<'a> SortedSources<'a> {
         let (projection, level) = (chart.projection(), bansho_base::math::simd::level());
         let bins = DistanceBins::new(spread_km, chart.row_step, field);
         let shown = VisibleRowTest::new(chart, field);
-        let sorted = |(task, sources): (usize, &[FieldLineSource])| {
-            let mut spans = vec![ColumnSpan::default(); sources.len()];
-            dispatch!(level, _simd => find_column_spans(sources, chart, &projection, &shown, &bins, &mut spans));
-            SortedChunk::new(&spans, task * TASK, chart, block_columns)
-        };
-        let chunks = sources.par_chunks(TASK).enumerate().map(sorted).collect();
+        let tasks = sources.par_chunks(TASK).enumerate();
+        let chunks = tasks
+            .map(|(task, sources)| {
+                let mut spans = vec![ColumnSpan::default(); sources.len()];
+                dispatch!(level, _simd => find_column_spans(sources, chart, &projection, &shown, &bins, &mut spans));
+                SortedChunk::new(&spans, task * TASK, chart, block_columns)
+            })
+            .collect();
         Self { sources, chunks, bins }
     }
 

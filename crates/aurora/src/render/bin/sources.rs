@@ -148,6 +148,7 @@ impl SourceBuilder<'_> {
                 positions[1][i] = ws[first + i].fma(offset_s, zs[first + i]);
                 energies[i] = particles.energies_ev[first + i];
             }
+            // Whole batches, so that this loop is vectorized; lanes from `count` on are not used.
             let mut feet = [[0.0; LANES]; 3];
             let mut nodes = [0.0; LANES];
             for i in 0..LANES {
@@ -203,40 +204,34 @@ impl Sources {
         let min_power = if by_collisions { MIN_RELATIVE_POWER_WITH_COLLISIONS } else { MIN_RELATIVE_POWER };
         let column = inputs.emission.column(inputs.energy_ev);
         let spread = math::hypot(inputs.spread_km(), times.smear_km);
-        let with = |emitter: SpectralEmitter, cell_km: f64| {
-            let diffusion = column.spread_km[emitter.index()];
-            math::sqrt(spread * spread + diffusion * diffusion + cell_km * cell_km / 6.0)
-        };
+        let [green_diffusion, red_diffusion] =
+            [SpectralEmitter::OxygenGreen, SpectralEmitter::OxygenRed].map(|emitter| column.spread_km[emitter.index()]);
         let cell_spreads = [
-            with(SpectralEmitter::OxygenGreen, afterglow.green.cell_km()),
-            with(SpectralEmitter::OxygenRed, afterglow.red.cell_km()),
+            cell_spread_km(spread, green_diffusion, afterglow.green.cell_km()),
+            cell_spread_km(spread, red_diffusion, afterglow.red.cell_km()),
         ];
         let blocks = [afterglow.green.block(cell_spreads[0]), afterglow.red.block(cell_spreads[1])];
         let ((green_w, green), red) = parallel::join(
             || afterglow.green.distribute_to_particles(inputs.particles, min_power, blocks[0]),
             || afterglow.red.bright_blocks(MIN_RELATIVE_POWER, blocks[1]),
         );
-        // Merged cells are drawn at their center: their spread replaces that of the single cells.
-        let of_block = |cell_spread: f64, cell_km: f64, block: usize| {
-            math::sqrt(cell_spread * cell_spread + ((block * block - 1) as f64) * cell_km * cell_km / 12.0)
-        };
-        let green_spread = of_block(cell_spreads[0], afterglow.green.cell_km(), blocks[0]);
-        let red_spread = of_block(cell_spreads[1], afterglow.red.cell_km(), blocks[1]);
-        let attenuation = inputs.attenuation;
-        let builder = |spread: f64, weight, instant| SourceBuilder {
+        let green_spread = block_spread_km(cell_spreads[0], afterglow.green.cell_km(), blocks[0]);
+        let red_spread = block_spread_km(cell_spreads[1], afterglow.red.cell_km(), blocks[1]);
+        let builder = SourceBuilder {
             field,
             reach: spread as f32 * REACH,
-            weight,
-            instant,
-            attenuation,
+            weight: 1.0,
+            instant: times.first_index,
+            attenuation: inputs.attenuation,
         };
         let lasting = LastingLight { green_w: &green_w, red_fraction: 0.0 };
-        let mut sharp = builder(green_spread, 1.0, times.first_index).cells(&green, GREEN);
+        let mut sharp = SourceBuilder { reach: green_spread as f32 * REACH, ..builder }.cells(&green, GREEN);
         let weight = 1.0 / times.offsets_s.len().max(1) as f32;
         for (offset_s, instant) in times.offsets_s.iter().zip(times.first_index..) {
-            sharp.extend(builder(spread, weight, instant).particles(inputs.particles, lasting, *offset_s as f32));
+            let builder = SourceBuilder { weight, instant, ..builder };
+            sharp.extend(builder.particles(inputs.particles, lasting, *offset_s as f32));
         }
-        let soft = builder(red_spread, 1.0, times.first_index).cells(&red, RED);
+        let soft = SourceBuilder { reach: red_spread as f32 * REACH, ..builder }.cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
     }
 }
@@ -246,11 +241,9 @@ impl Sources {
     pub(crate) fn add(&mut self, others: &Self, weight: f32) {
         let first = self.sharp.is_empty() && self.soft.is_empty();
         for (sum, others) in [(&mut self.sharp, &others.sharp), (&mut self.soft, &others.soft)] {
-            let dimmed = |source: &FieldLineSource| FieldLineSource {
-                power: source.power.map(|power| weight * power),
-                ..*source
-            };
-            sum.extend(others.iter().map(dimmed));
+            for source in others {
+                sum.push(FieldLineSource { power: source.power.map(|power| weight * power), ..*source });
+            }
         }
         for (spread, other) in self.spread_km.iter_mut().zip(others.spread_km) {
             *spread = if first { other } else { spread.min(other) };
@@ -297,8 +290,26 @@ impl EmissionInputs<'_> {
     }
 }
 
-/// The nearest node of the energy grid.
+/// Standard deviation of the light of an afterglow cell, km: that of the light of its particles, `spread`, the diffusion
+/// of the excited atoms, and its own width, as a triangle of that half-width.
+fn cell_spread_km(spread: f64, diffusion: f64, cell_km: f64) -> f64 {
+    math::sqrt(spread * spread + diffusion * diffusion + cell_km * cell_km / 6.0)
+}
+
+/// The same of a block of `block` by `block` cells, each with `cell_spread`, which is drawn at its center.
+fn block_spread_km(cell_spread: f64, cell_km: f64, block: usize) -> f64 {
+    // The variance of the positions of n equal cells in a row is (n^2 - 1) / 12 cells^2.
+    math::sqrt(cell_spread * cell_spread + ((block * block - 1) as f64) * cell_km * cell_km / 12.0)
+}
+
+/// The node of the energy grid that is nearest on a logarithmic scale.
 pub(crate) fn nearest_node(energy_ev: f64) -> usize {
-    let distance = |node: &usize| (math::ln(node_energy_ev(*node) / energy_ev.max(1.0))).abs();
-    (0..NODES).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    let (mut nearest, mut min_distance) = (0, f64::INFINITY);
+    for node in 0..NODES {
+        let distance = math::ln(node_energy_ev(node) / energy_ev.max(1.0)).abs();
+        if distance < min_distance {
+            (nearest, min_distance) = (node, distance);
+        }
+    }
+    nearest
 }

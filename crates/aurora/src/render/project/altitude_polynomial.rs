@@ -130,9 +130,13 @@ pub(crate) struct RowPolynomials {
 
 impl RowPolynomialBasis {
     pub(crate) fn new() -> Self {
-        let altitude = |node: usize| (1.0 / HALF.mul_add(chebyshev_node(node), MIDDLE) - PIVOT_KM) as f32;
+        let mut altitudes_km = [0.0; NODES];
+        for (node, altitude_km) in altitudes_km.iter_mut().enumerate() {
+            // The inverse of the altitude coordinate.
+            *altitude_km = (1.0 / HALF.mul_add(chebyshev_node(node), MIDDLE) - PIVOT_KM) as f32;
+        }
         Self {
-            altitudes_km: std::array::from_fn(altitude),
+            altitudes_km,
             full: std::array::from_fn(|node| coefficients(node, NODES)),
             short: std::array::from_fn(|node| coefficients(node, TERMS)),
         }
@@ -220,8 +224,13 @@ fn coefficients(node: usize, terms: usize) -> [f32; NODES] {
         }
         // T(n + 1) = 2 x T(n) - T(n - 1), and T(1) = x.
         let scale = if term == 0 { 1.0 } else { 2.0 };
-        let times_x = |power: usize| if power == 0 { 0.0 } else { scale * polynomial[power - 1] };
-        let next = std::array::from_fn(|power| times_x(power) - last[power]);
+        let mut next = [0.0; NODES];
+        for (times_x, coefficient) in next[1..].iter_mut().zip(polynomial) {
+            *times_x = scale * coefficient;
+        }
+        for (coefficient, last) in next.iter_mut().zip(last) {
+            *coefficient -= last;
+        }
         (last, polynomial) = (polynomial, next);
     }
     powers.map(|power| power as f32)

@@ -107,11 +107,9 @@ impl Coverage {
 /// Components along and across the field of sampled directions of the picture, without those far below the horizon.
 fn directions<'a>(camera: &'a Camera, field: &'a FieldLines) -> impl Iterator<Item = [f64; 3]> + 'a {
     (0..SAMPLES_PER_SIDE * SAMPLES_PER_SIDE).filter_map(move |index| {
-        let fraction = |at: usize| at as f64 / (SAMPLES_PER_SIDE - 1) as f64;
-        let pixel = DVec2::new(
-            fraction(index % SAMPLES_PER_SIDE) * camera.size[0],
-            fraction(index / SAMPLES_PER_SIDE) * camera.size[1],
-        );
+        let [x, y] = [index % SAMPLES_PER_SIDE, index / SAMPLES_PER_SIDE]
+            .map(|sample| sample as f64 / (SAMPLES_PER_SIDE - 1) as f64);
+        let pixel = DVec2::new(x * camera.size[0], y * camera.size[1]);
         let direction = camera.direction(pixel)?.normalize();
         (direction.y > MIN_SINE_ELEVATION || field.is_above_light())
             .then(|| [field.along, field.across[0], field.across[1]].map(|axis| direction.dot(axis)))
@@ -168,10 +166,15 @@ impl Chart {
 
     /// Cotangents of the colatitudes of every row and of `padding` rows beyond, and inverse sines of those of every row.
     pub(crate) fn row_tables(&self, padding: usize) -> [Vec<f32>; 2] {
-        let trigonometry = |row| math::sin_cos(self.colatitude(row));
-        let cotangents = (0..self.rows + padding).map(trigonometry).map(|(sin, cos)| (cos / sin.max(1e-9)) as f32);
-        let inverses = (0..self.rows).map(trigonometry).map(|(sin, _)| (1.0 / sin.max(1e-9)) as f32);
-        [cotangents.collect(), inverses.collect()]
+        let (mut cotangents, mut inverse_sines) = (Vec::new(), Vec::new());
+        for row in 0..self.rows + padding {
+            let (sin, cos) = math::sin_cos(self.colatitude(row));
+            let sin = sin.max(1e-9);
+            cotangents.push((cos / sin) as f32);
+            inverse_sines.push((1.0 / sin) as f32);
+        }
+        inverse_sines.truncate(self.rows);
+        [cotangents, inverse_sines]
     }
 
     /// Wraps or clamps a column that is at most one column outside the chart.

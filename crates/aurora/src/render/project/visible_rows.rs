@@ -32,17 +32,17 @@ impl VisibleRowTest {
         // Only the outward component depends on the longitude.
         let [[squared, first, along], [_, second, _]] =
             [[1.0, 0.0], [0.0, 1.0]].map(|unit| field.meridian(unit).coefficients_f32());
-        let unit = |row: f64| {
+        let [first_row, last_row] = [-MARGIN_ROWS, chart.rows as f64 + MARGIN_ROWS].map(|row| {
             let (sine, cosine) = math::sin_cos((chart.colatitude(0) + row * chart.row_step).clamp(0.0, PI));
             [sine as f32, cosine as f32]
-        };
+        });
         Self {
             squared,
             along,
             across: [first, second],
             lean: first.fma(first, second * second).sqrt(),
-            first: unit(-MARGIN_ROWS),
-            last: unit(chart.rows as f64 + MARGIN_ROWS),
+            first: first_row,
+            last: last_row,
         }
     }
 

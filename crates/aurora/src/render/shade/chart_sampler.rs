@@ -81,10 +81,9 @@ impl ChartSampler<'_> {
             return false;
         }
         let [top, bottom] = colatitudes.map(|colatitude| (self.projection.row(colatitude).max(0.0)) as u32);
-        let dark = |column: i32| {
+        (left - 2..=right + 2).all(|column| {
             let [first, end] = valid_rows[chart.wrap_column(column)];
             bottom + 2 < first || top >= end + 2
-        };
-        (left - 2..=right + 2).all(dark)
+        })
     }
 }

@@ -68,9 +68,8 @@ impl ColorPass<'_> {
             let [soft_first, soft_end] = self.soft_column(simd, self.chart.longitude(number) as f32, soft);
             let [mut first, mut end] = block.valid_rows[column].map(|row| row as usize);
             if soft_first < soft_end {
-                let row = |soft_row: usize| self.row_of_soft(soft_row);
-                first = first.min(row(soft_first.saturating_sub(1)));
-                end = end.max((row(soft_end) + 1).min(self.chart.rows));
+                first = first.min(self.row_of_soft(soft_first.saturating_sub(1)));
+                end = end.max((self.row_of_soft(soft_end) + 1).min(self.chart.rows));
             }
             if first >= end {
                 continue;

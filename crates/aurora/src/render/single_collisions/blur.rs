@@ -45,13 +45,21 @@ impl BlurKernel {
         let sigmas = EMITTERS.map(|emitter| radii.pixels(emitter));
         let max_sigma = sigmas.into_iter().fold(0.0, f64::max);
         let count = (KERNEL_SIGMAS * max_sigma).ceil() as usize + 1;
-        let by_emitter = sigmas.map(|sigma| {
+        let mut weights = vec![[0.0; EMITTERS.len()]; count];
+        for (emitter, sigma) in sigmas.into_iter().enumerate() {
+            // Variances add: the kernel adds what the charts lack.
             let remaining = math::sqrt((sigma * sigma - CHART_SIGMA * CHART_SIGMA).max(1e-4));
-            let gaussian = |distance: usize| math::exp(-0.5 * math::pow(distance as f64 / remaining, 2.0));
-            let whole = 2.0 * (0..count).map(gaussian).sum::<f64>() - 1.0;
-            (0..count).map(|distance| (gaussian(distance) / whole) as f32).collect::<Vec<_>>()
-        });
-        Self((0..count).map(|distance| std::array::from_fn(|emitter| by_emitter[emitter][distance])).collect())
+            let mut gaussian = vec![0.0; count];
+            for (distance, value) in gaussian.iter_mut().enumerate() {
+                *value = math::exp(-0.5 * math::pow(distance as f64 / remaining, 2.0));
+            }
+            // Both sides; the center counts once.
+            let whole = 2.0 * gaussian.iter().sum::<f64>() - 1.0;
+            for (weights, value) in weights.iter_mut().zip(gaussian) {
+                weights[emitter] = (value / whole) as f32;
+            }
+        }
+        Self(weights)
     }
 
     /// Half-width of the support, pixels.

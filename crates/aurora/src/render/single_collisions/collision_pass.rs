@@ -85,17 +85,19 @@ impl CollisionRenderer {
         highest: usize,
         key: Key,
     ) -> Self {
-        let deviation = |index: usize| {
+        let mut deviations = vec![[0.0; SPLAT_LANES]; DEVIATIONS];
+        for (index, deviation) in deviations.as_flattened_mut().iter_mut().enumerate() {
             // The sum of three uniforms approximates that density; scaled to its variance, 1/7.
             let [a, b, c, _] = key.uniforms(index as u64, 1, SOURCE);
-            (a + b + c - 1.5) * (4.0_f32 / 7.0).sqrt()
-        };
-        let deviations = |batch: usize| std::array::from_fn(|lane| deviation(batch * SPLAT_LANES + lane));
+            *deviation = (a + b + c - 1.5) * (4.0_f32 / 7.0).sqrt();
+        }
         let highest = highest.min(NODES - 1);
-        let levels = emission.photons_per_ion_pair().iter().enumerate();
-        let attenuated =
-            |(level, photons): (usize, &PerEmitter<f64>)| photons.map(|photons| photons * attenuation.of_level(level));
-        let photons = levels.map(attenuated).chain([[0.0; 4]]);
+        let mut photons = Vec::new();
+        for (level, per_pair) in emission.photons_per_ion_pair().iter().enumerate() {
+            photons.push(per_pair.map(|photons| (photons * attenuation.of_level(level)) as f32));
+        }
+        // The row of `NO_EMISSION`.
+        photons.push([0.0; 4]);
         let (deposition, deflection) = (emission.deposition(), rendering.collision_deflection);
         let mut pairs: Vec<_> = (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect();
         let tracks = match rendering.energy_deposition {
@@ -110,16 +112,20 @@ impl CollisionRenderer {
                 })
             }
         };
-        let support_km = |node| REACH * emission.lateral_spread_km(deflection, node_energy_ev(node)) as f32;
+        let mut spread_squared = vec![0.0; NODES];
+        for (node, squared) in spread_squared.iter_mut().enumerate() {
+            let support_km = REACH * emission.lateral_spread_km(deflection, node_energy_ev(node)) as f32;
+            *squared = support_km * support_km;
+        }
         Self {
             key,
             tracks,
             deposition: emission.deposition().clone(),
-            photons: photons.map(|photons| photons.map(|value| value as f32)).collect(),
+            photons,
             basis: RowPolynomialBasis::new(),
             pairs,
-            spread_squared: (0..NODES).map(|node| support_km(node) * support_km(node)).collect(),
-            deviations: (0..DEVIATIONS).map(deviations).collect(),
+            spread_squared,
+            deviations,
         }
     }
 
@@ -146,10 +152,12 @@ impl CollisionRenderer {
         let mut blocks: Vec<_> = blocks.map(|block| (sorted_sources.count(block.number), block)).collect();
         blocks.sort_by_key(|(count, _)| *count);
         let blocks = Mutex::new(blocks);
-        let next = || blocks.lock().unwrap_or_else(PoisonError::into_inner).pop();
         (0..parallel::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
             let mut scratch = None;
-            while let Some((_, block)) = next() {
+            loop {
+                // A statement of its own, so that the lock is released before the block is drawn.
+                let next = blocks.lock().unwrap_or_else(PoisonError::into_inner).pop();
+                let Some((_, block)) = next else { break };
                 let scratch = scratch.get_or_insert_with(|| CollisionScratch::new(chart));
                 dispatch!(level, simd => pass.draw_block(simd, block, field, scratch));
             }

@@ -39,11 +39,13 @@ pub(super) struct CollisionBatch {
 impl TrackTable {
     /// Tracks for a number of energy nodes, with the photon row of each collision.
     pub(super) fn new(nodes: usize, track: impl Fn(usize, u32) -> Vec<(Collision, u16)> + Sync) -> Self {
-        let of_node = |node: usize| -> Vec<CollisionBatch> {
-            let count = (collision_count(node) as usize).div_ceil(SPLAT_LANES);
-            (0..TRACKS_PER_ENERGY).flat_map(|variant| batches(&track(node, variant), count)).collect()
-        };
-        let by_node: Vec<_> = (0..nodes).into_par_iter().map(of_node).collect();
+        let by_node: Vec<Vec<CollisionBatch>> = (0..nodes)
+            .into_par_iter()
+            .map(|node| {
+                let count = (collision_count(node) as usize).div_ceil(SPLAT_LANES);
+                (0..TRACKS_PER_ENERGY).flat_map(|variant| batches(&track(node, variant), count)).collect()
+            })
+            .collect();
         let mut starts = vec![0];
         starts.extend(by_node.iter().scan(0, |end, batches| {
             *end += batches.len();

@@ -21,10 +21,13 @@ pub(super) fn color(srgb: [f32; 3]) -> [f32; 3] {
 /// The color of a value from 0 to 1 as in the thesis's figures: blue, cyan, green, yellow, red.
 pub(super) fn false_color(value: f64) -> [f32; 3] {
     let position = 4.0 * value.clamp(0.0, 1.0);
-    let ramp = |peak: f64| (1.5 - (position - peak).abs()).clamp(0.0, 1.0) as f32;
-    // The ramps overlap by half; display codes rise evenly, so values are decoded.
-    let decoded = |code: f32| math::pow(f64::from(code), 2.2) as f32;
-    color([ramp(4.0 - 0.5), ramp(2.0), ramp(0.5)].map(decoded))
+    // Positions at which red, green and blue are brightest: their ramps overlap by half.
+    let srgb = [4.0 - 0.5, 2.0, 0.5].map(|peak: f64| {
+        let code = (1.5 - (position - peak).abs()).clamp(0.0, 1.0) as f32;
+        // Display codes rise evenly, so values are decoded.
+        math::pow(f64::from(code), 2.2) as f32
+    });
+    color(srgb)
 }
 
 impl Canvas {
@@ -56,10 +59,9 @@ impl Canvas {
         let (from, to) = (self.pixel(from), self.pixel(to));
         let reach = 0.5 * width + 1.0;
         let (low, high) = (from.min(to) - DVec2::splat(reach), from.max(to) + DVec2::splat(reach));
-        let range = |low: f64, high: f64| {
+        let [columns, rows] = [(low.x, high.x), (low.y, high.y)].map(|(low, high)| {
             (low.floor().max(0.0) as usize).min(self.side)..(high.ceil().max(0.0) as usize).min(self.side)
-        };
-        let (columns, rows) = (range(low.x, high.x), range(low.y, high.y));
+        });
         for y in rows {
             for x in columns.clone() {
                 let center = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);

@@ -84,10 +84,11 @@ fn draw_counts(canvas: &mut Canvas, simulation: &AuroraSimulation, counts: &Grid
 /// The noise (figure 2.11), from its lowest to its highest value.
 fn draw_noise(canvas: &mut Canvas, simulation: &AuroraSimulation) {
     let grid = simulation.potential();
-    let noise = |position: DVec2| simulation.potential_noise(cell_center(grid, position));
+    canvas.fill(|position| [simulation.potential_noise(cell_center(grid, position)) as f32; 3]);
     let mut highest = 0.0_f64;
-    canvas.fill(|position| [noise(position) as f32; 3]);
-    canvas.pixels.iter().for_each(|[value, ..]| highest = highest.max(f64::from(value.abs())));
+    for [value, ..] in &canvas.pixels {
+        highest = highest.max(f64::from(value.abs()));
+    }
     let scale = 0.5 / highest.max(f64::MIN_POSITIVE);
     for pixel in &mut canvas.pixels {
         *pixel = false_color(0.5 + scale * f64::from(pixel[0]));
@@ -98,22 +99,20 @@ fn draw_noise(canvas: &mut Canvas, simulation: &AuroraSimulation) {
 fn draw_potential(canvas: &mut Canvas, simulation: &AuroraSimulation) {
     let grid = simulation.potential();
     let lowest = grid.values().iter().copied().fold(0.0, f64::min);
-    let potential = |position: DVec2| {
+    canvas.fill(|position| {
         let center = cell_center(grid, position);
-        grid.sample(center.to_array()) + simulation.potential_noise(center)
-    };
-    canvas.fill(|position| false_color(1.0 - potential(position) / lowest.min(-f64::MIN_POSITIVE)));
+        let potential = grid.sample(center.to_array()) + simulation.potential_noise(center);
+        false_color(1.0 - potential / lowest.min(-f64::MIN_POSITIVE))
+    });
     let [columns, rows] = grid.size();
     let spacing = grid.spacing();
-    let cells = |count: usize| (ARROW_SPACING / 2..count).step_by(ARROW_SPACING);
-    let positions = cells(rows).flat_map(|row| cells(columns).map(move |column| [column, row]));
-    let arrows: Vec<[DVec2; 2]> = positions
-        .map(|cell| {
-            let position =
-                DVec2::from(grid.origin()) + DVec2::new(cell[0] as f64 + 0.5, cell[1] as f64 + 0.5) * spacing;
-            [position, simulation.electric_field(position)]
-        })
-        .collect();
+    let mut arrows: Vec<[DVec2; 2]> = Vec::new();
+    for row in (ARROW_SPACING / 2..rows).step_by(ARROW_SPACING) {
+        for column in (ARROW_SPACING / 2..columns).step_by(ARROW_SPACING) {
+            let position = DVec2::from(grid.origin()) + DVec2::new(column as f64 + 0.5, row as f64 + 0.5) * spacing;
+            arrows.push([position, simulation.electric_field(position)]);
+        }
+    }
     let longest = arrows.iter().map(|[_, field]| field.length()).fold(0.0, f64::max);
     if longest > 0.0 {
         let length_km = ARROW_LENGTH * ARROW_SPACING as f64 * spacing;

@@ -48,34 +48,49 @@ impl LinkConstraints {
         let mut constraints =
             Self { chain_constraints: vec![MatchConstraint::default(); transition.chains.len()], points: Vec::new() };
         for (number, link) in links.iter().enumerate() {
-            let error = |kind| ShapeError { key: format!("shapes.{index}.link.{number}"), kind };
-            let from = sheet_index(link.from, sheets.len()).map_err(error)?;
-            let count = transition.chains.len();
-            let no_target = |_| error(ShapeErrorKind::NoSuchTarget { sheet: link.to, count });
-            let to = sheet_index(link.to, count).map_err(no_target)?;
-            let track = nearest(&sheets[from], link.from_length_fraction.unwrap_or(0.5), tracks, index - 1);
-            constraints.constrain_chain(transition, track, to).map_err(error)?;
-            match (link.from_length_fraction, link.to_length_fraction) {
-                (Some(_), Some(fraction)) => {
-                    let fraction = fraction.clamp(END_MARGIN, 1.0 - END_MARGIN);
-                    constraints.points.push(LinkedPoint { track, fraction });
-                }
-                (Some(_), None) if !splits(&sheets[from], transition) => {
-                    return Err(error(ShapeErrorKind::PointWithoutArrival));
-                }
-                (_, None) => {}
-                (None, Some(_)) => return Err(error(ShapeErrorKind::ArrivalWithoutPoint)),
-            }
-            constraints.check_order(transition).map_err(error)?;
+            constraints
+                .add(link, index - 1, sheets, transition, tracks)
+                .map_err(|kind| ShapeError::in_shape(index, &format!("link.{number}"), kind))?;
         }
         Ok(constraints)
     }
 
+    /// Adds the constraints of a link from `sheets` of shape `knot`.
+    fn add(
+        &mut self,
+        link: &LinkParameters,
+        knot: usize,
+        sheets: &[Vec<usize>],
+        transition: &Transition,
+        tracks: &[ControlPointTrack],
+    ) -> Result<(), ShapeErrorKind> {
+        let from = sheet_index(link.from, sheets.len())?;
+        let count = transition.chains.len();
+        let to = sheet_index(link.to, count).map_err(|_| ShapeErrorKind::NoSuchTarget { sheet: link.to, count })?;
+        let track = nearest(&sheets[from], link.from_length_fraction.unwrap_or(0.5), tracks, knot);
+        self.constrain_chain(transition, track, to)?;
+        match (link.from_length_fraction, link.to_length_fraction) {
+            (Some(_), Some(fraction)) => {
+                let fraction = fraction.clamp(END_MARGIN, 1.0 - END_MARGIN);
+                self.points.push(LinkedPoint { track, fraction });
+            }
+            (Some(_), None) if !splits(&sheets[from], transition) => return Err(ShapeErrorKind::PointWithoutArrival),
+            (_, None) => {}
+            (None, Some(_)) => return Err(ShapeErrorKind::ArrivalWithoutPoint),
+        }
+        self.check_order(transition)
+    }
+
+    /// Fraction of the new sheet's length at which a track must arrive, if it is linked.
+    fn arrival(&self, track: usize) -> Option<f64> {
+        self.points.iter().find(|point| point.track == track).map(|point| point.fraction)
+    }
+
     /// Requires that the chain that contains `track` becomes sheet `to`.
     fn constrain_chain(&mut self, transition: &Transition, track: usize, to: usize) -> Result<(), ShapeErrorKind> {
-        let contains_track = |chain: &usize| transition.tracks_of(*chain).contains(&track);
         // Every track of a sheet is in one of its strands.
-        let chain = (0..transition.chains.len()).find(contains_track).unwrap_or_default();
+        let chain = (0..transition.chains.len()).find(|chain| transition.tracks_of(*chain).contains(&track));
+        let chain = chain.unwrap_or_default();
         let other = self.chain_constraints.iter().position(|chain_constraint| chain_constraint.target == Some(to));
         if self.chain_constraints[chain].target.is_some_and(|target| target != to)
             || other.is_some_and(|other| other != chain)
@@ -88,18 +103,16 @@ impl LinkConstraints {
 
     /// Linked points must arrive in ascending or descending order, which determines the sheet's direction.
     fn check_order(&mut self, transition: &Transition) -> Result<(), ShapeErrorKind> {
-        for (chain, chain_constraint) in self.chain_constraints.iter_mut().enumerate() {
+        for chain in 0..self.chain_constraints.len() {
             let tracks = transition.tracks_of(chain);
-            let arrival =
-                |track: &usize| self.points.iter().find(|point| point.track == *track).map(|point| point.fraction);
-            let arrivals: Vec<f64> = tracks.iter().filter_map(arrival).collect();
+            let arrivals: Vec<f64> = tracks.iter().filter_map(|&track| self.arrival(track)).collect();
             let linked = self.points.iter().filter(|point| tracks.contains(&point.track)).count();
             let [rising, falling] =
                 [1.0, -1.0].map(|sign| arrivals.windows(2).all(|pair| sign * (pair[1] - pair[0]) > 0.0));
             if linked > arrivals.len() || !(rising || falling) {
                 return Err(ShapeErrorKind::LinksCross);
             }
-            chain_constraint.reversed = (arrivals.len() > 1).then_some(falling);
+            self.chain_constraints[chain].reversed = (arrivals.len() > 1).then_some(falling);
         }
         Ok(())
     }
@@ -107,20 +120,21 @@ impl LinkConstraints {
     /// Linked points of `strand` that arrive within `range` of the sheet's length.
     pub(crate) fn anchors(&self, strand: &[usize], range: [f64; 2]) -> Vec<Anchor> {
         let [low, high] = if range[0] <= range[1] { range } else { [range[1], range[0]] };
-        let anchor = |(point, track): (usize, &usize)| {
-            let fraction = self.points.iter().find(|linked| linked.track == *track)?.fraction;
-            let is_inner = fraction > low && fraction < high && point > 0 && point + 1 < strand.len();
-            is_inner.then_some(Anchor { point, fraction })
-        };
-        strand.iter().enumerate().filter_map(anchor).collect()
+        let mut anchors = Vec::new();
+        for (point, &track) in strand.iter().enumerate() {
+            let Some(fraction) = self.arrival(track) else { continue };
+            if fraction > low && fraction < high && point > 0 && point + 1 < strand.len() {
+                anchors.push(Anchor { point, fraction });
+            }
+        }
+        anchors
     }
 }
 
 /// Whether a sheet splits in the transition.
 fn splits(sheet: &[usize], transition: &Transition) -> bool {
-    let whole =
-        |strand: &Vec<usize>| [sheet.first(), sheet.last()].into_iter().flatten().all(|end| strand.contains(end));
-    !transition.strands.iter().any(whole)
+    let ends = sheet.first().into_iter().chain(sheet.last());
+    !transition.strands.iter().any(|strand| ends.clone().all(|end| strand.contains(end)))
 }
 
 /// The inner control point of `sheet` that is nearest to a fraction of its length.

@@ -74,9 +74,10 @@ pub(crate) fn match_sheets(
         let is_forbidden = constraints[source].target.is_some_and(|required| required != target);
         best[source * count + target].0 + if is_forbidden { forbidden } else { 0.0 }
     });
-    let sheet_match =
-        |(source, target): (usize, usize)| SheetMatch { target, reversed: best[source * count + target].1 };
-    let initial = columns.into_iter().enumerate().map(sheet_match).collect();
+    let mut initial = Vec::with_capacity(count);
+    for (source, target) in columns.into_iter().enumerate() {
+        initial.push(SheetMatch { target, reversed: best[source * count + target].1 });
+    }
     comparison.reduce_crossings(initial).0
 }
 
@@ -104,10 +105,12 @@ impl Comparison<'_> {
 
     /// Sheets interpolated at a fraction of the transition.
     fn interpolated(&self, matches: &[SheetMatch], fraction: f64) -> Vec<Vec<DVec2>> {
-        let sheet = |(source, matched): (&Vec<DVec2>, &SheetMatch)| -> Vec<DVec2> {
-            source.iter().zip(self.target(*matched)).map(|(from, to)| from.lerp(to, fraction)).collect()
-        };
-        self.sources.iter().zip(matches).map(sheet).collect()
+        let mut sheets = Vec::with_capacity(matches.len());
+        for (source, matched) in self.sources.iter().zip(matches) {
+            let points = source.iter().zip(self.target(*matched));
+            sheets.push(points.map(|(from, to)| from.lerp(to, fraction)).collect());
+        }
+        sheets
     }
 
     fn crossings(&self, matches: &[SheetMatch]) -> usize {
@@ -122,6 +125,7 @@ impl Comparison<'_> {
             .collect()
     }
 
+    /// Number of crossings and total motion.
     fn cost(&self, matches: &[SheetMatch]) -> (usize, f64) {
         (self.crossings(matches), self.all_motion(matches))
     }
@@ -133,16 +137,15 @@ impl Comparison<'_> {
     /// Local search: reverses one or swaps two as long as the number of crossings, or at equal number the motion,
     /// decreases. Also returns the number of changes tried.
     fn reduce_crossings(&self, mut matches: Vec<SheetMatch>) -> (Vec<SheetMatch>, usize) {
-        let less = |a: (usize, f64), b: (usize, f64)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12));
         let max_tries = MAX_CROSSING_TESTS / matches.len().max(1);
         let (mut cost, mut tries) = (self.cost(&matches), 0);
         while cost.0 > 0 && tries < max_tries {
             let candidates = self.candidate_changes(&matches, (max_tries / CANDIDATES_DIVISOR).min(max_tries - tries));
             tries += candidates.len();
             let candidates = candidates.into_iter().map(|other| (self.cost(&other), other));
-            let best = candidates.reduce(|a, b| if less(b.0, a.0) { b } else { a });
+            let best = candidates.reduce(|a, b| if is_less(b.0, a.0) { b } else { a });
             match best {
-                Some((better, other)) if less(better, cost) => (cost, matches) = (better, other),
+                Some((better, other)) if is_less(better, cost) => (cost, matches) = (better, other),
                 _ => break,
             }
         }
@@ -161,24 +164,29 @@ impl Comparison<'_> {
                 .filter(|change| change.iter().all(|(source, matched)| self.constraints[*source].allows(*matched)));
             changes.extend(allowed);
         }
-        let more = |change: &[(usize, SheetMatch); 2]| -> f64 {
-            // A reversal is listed twice.
-            let changed = if change[0].0 == change[1].0 { &change[..1] } else { change };
-            changed
-                .iter()
-                .map(|(source, matched)| self.motion(*source, *matched) - self.motion(*source, matches[*source]))
-                .sum()
-        };
         if changes.len() > max_changes {
-            changes.sort_by(|a, b| more(a).total_cmp(&more(b)));
+            changes.sort_by(|a, b| self.added_motion(matches, a).total_cmp(&self.added_motion(matches, b)));
             changes.truncate(max_changes);
         }
-        let changed = |change: [(usize, SheetMatch); 2]| {
-            let mut all = matches.to_vec();
-            change.into_iter().for_each(|(source, matched)| all[source] = matched);
-            all
-        };
-        changes.into_iter().map(changed).collect()
+        let mut candidates = Vec::with_capacity(changes.len());
+        for change in changes {
+            let mut changed = matches.to_vec();
+            for (source, matched) in change {
+                changed[source] = matched;
+            }
+            candidates.push(changed);
+        }
+        candidates
+    }
+
+    /// Motion of a change beyond that of the present matches.
+    fn added_motion(&self, matches: &[SheetMatch], change: &[(usize, SheetMatch); 2]) -> f64 {
+        // A reversal is listed twice.
+        let changed = if change[0].0 == change[1].0 { &change[..1] } else { change };
+        changed
+            .iter()
+            .map(|(source, matched)| self.motion(*source, *matched) - self.motion(*source, matches[*source]))
+            .sum()
     }
 
     /// The new matches of two sheets that swap their targets, or of a sheet that is reversed.
@@ -190,6 +198,11 @@ impl Comparison<'_> {
         [(one, matches[other].target), (other, matches[one].target)]
             .map(|(source, target)| (source, SheetMatch { target, reversed: self.best_direction(source, target).1 }))
     }
+}
+
+/// Whether cost `a` (crossings, motion) is lower than `b`, by more than the rounding of the motion.
+fn is_less(a: (usize, f64), b: (usize, f64)) -> bool {
+    a.0 < b.0 || (a.0 == b.0 && a.1 < b.1 * (1.0 - 1e-12))
 }
 
 #[cfg(test)]

@@ -79,18 +79,9 @@ impl Transition {
         }
         let mut chains = Chains::new(transition.strands.len());
         for (number, merge) in parameters.merge.iter().enumerate() {
-            let error = |kind| ShapeError { key: format!("shapes.{index}.merge.{number}"), kind };
-            let sheet_ends = merged_ends(merge, sheets, tracks, index - 1).map_err(error)?;
-            let strand_ends = sheet_ends.map(|LineEnd { line, end }| LineEnd { line: outer_strands[line][end], end });
-            for (strand_end, sheet_end) in strand_ends.iter().zip(sheet_ends) {
-                if chains.links[strand_end.line][strand_end.end].is_some() {
-                    let kind = ShapeErrorKind::MergedTwice { sheet: sheet_end.line + 1, is_end: sheet_end.end == 1 };
-                    return Err(error(kind));
-                }
-            }
-            if !chains.join(strand_ends) {
-                return Err(error(ShapeErrorKind::Ring { sheet: sheet_ends[0].line + 1 }));
-            }
+            let strand_ends = merged_ends(merge, sheets, tracks, index - 1)
+                .and_then(|sheet_ends| chains.join_sheets(sheet_ends, &outer_strands))
+                .map_err(|kind| ShapeError::in_shape(index, &format!("merge.{number}"), kind))?;
             transition.add_merge_points(strand_ends, index - 1, tracks);
         }
         transition.chains = chains.collect();
@@ -133,9 +124,15 @@ impl Transition {
     pub(crate) fn refine(&mut self, count: usize, knot: usize, tracks: &mut Vec<ControlPointTrack>) {
         for strand in &mut self.strands {
             while strand.len() < count {
-                let at = |track: usize| tracks[track].knot(knot).position;
-                let length = |index: usize| at(strand[index]).distance_squared(at(strand[index + 1]));
-                let longest = (0..strand.len() - 1).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
+                // The last one of those that are equally long.
+                let (mut longest, mut longest_squared) = (0, 0.0);
+                for (index, pair) in strand.windows(2).enumerate() {
+                    let [from, to] = [pair[0], pair[1]].map(|track| tracks[track].knot(knot).position);
+                    let squared = from.distance_squared(to);
+                    if squared >= longest_squared {
+                        (longest, longest_squared) = (index, squared);
+                    }
+                }
                 let parents = Parents { tracks: [strand[longest], strand[longest + 1]], fraction: 0.5 };
                 strand.insert(longest + 1, add_track(parents, knot, tracks));
             }
@@ -144,13 +141,13 @@ impl Transition {
 
     /// The gaps that open and close.
     pub(crate) fn gaps(&self) -> Vec<Gap> {
-        let gap = |pair: &CoincidentPoints, opens: bool| Gap { ends: pair.new, opens };
-        let opening = self.splits.iter().map(|pair| gap(pair, true));
-        opening.chain(self.merges.iter().map(|pair| gap(pair, false))).collect()
+        let opening = self.splits.iter().map(|pair| Gap { ends: pair.new, opens: true });
+        let closing = self.merges.iter().map(|pair| Gap { ends: pair.new, opens: false });
+        opening.chain(closing).collect()
     }
 
     /// The tracks of chain `chain`, along it.
-    pub(super) fn tracks_of(&self, chain: usize) -> Vec<usize> {
+    pub(crate) fn tracks_of(&self, chain: usize) -> Vec<usize> {
         self.chains[chain].iter().flat_map(|&link| self.tracks_along(link)).collect()
     }
 
@@ -186,17 +183,29 @@ fn cuts(
 ) -> Result<Vec<Vec<Cut>>, ShapeError> {
     let mut cuts: Vec<Vec<Cut>> = vec![Vec::new(); sheets.len()];
     for (number, split) in parameters.split.iter().enumerate() {
-        let error = |kind| ShapeError { key: format!("shapes.{index}.split.{number}"), kind };
-        let sheet = sheet_index(split.sheet, sheets.len()).map_err(error)?;
-        let positions: Vec<DVec2> = sheets[sheet].iter().map(|&track| tracks[track].knot(index - 1).position).collect();
-        let cut = cut_of(split, sheet, &positions).map_err(error)?;
-        if cuts[sheet].iter().any(|other| other.segment == cut.segment) {
-            return Err(error(ShapeErrorKind::SplitTwice { sheet: sheet + 1, segment: cut.segment + 1 }));
-        }
-        cuts[sheet].push(cut);
+        add_cut(&mut cuts, split, sheets, tracks, index - 1)
+            .map_err(|kind| ShapeError::in_shape(index, &format!("split.{number}"), kind))?;
     }
     cuts.iter_mut().for_each(|cuts| cuts.sort_by_key(|cut| cut.segment));
     Ok(cuts)
+}
+
+/// Adds the cut of a split to those of its sheet.
+fn add_cut(
+    cuts: &mut [Vec<Cut>],
+    split: &SplitParameters,
+    sheets: &[Vec<usize>],
+    tracks: &[ControlPointTrack],
+    knot: usize,
+) -> Result<(), ShapeErrorKind> {
+    let sheet = sheet_index(split.sheet, sheets.len())?;
+    let positions: Vec<DVec2> = sheets[sheet].iter().map(|&track| tracks[track].knot(knot).position).collect();
+    let cut = cut_of(split, sheet, &positions)?;
+    if cuts[sheet].iter().any(|other| other.segment == cut.segment) {
+        return Err(ShapeErrorKind::SplitTwice { sheet: sheet + 1, segment: cut.segment + 1 });
+    }
+    cuts[sheet].push(cut);
+    Ok(())
 }
 
 /// The cut of a split sheet with these positions of its control points.
@@ -232,24 +241,33 @@ fn merged_ends(
         return Err(ShapeErrorKind::Ring { sheet: pair[0] + 1 });
     }
     let Auto::Set(at) = merge.ends else { return Ok(nearest_ends(pair, sheets, tracks, knot)) };
-    let end = |side: usize| match at[side] {
-        0.0 => Ok(LineEnd { line: pair[side], end: 0 }),
-        1.0 => Ok(LineEnd { line: pair[side], end: 1 }),
-        length_fraction => Err(ShapeErrorKind::NotAnEnd { sheet: pair[side] + 1, length_fraction }),
-    };
-    Ok([end(0)?, end(1)?])
+    Ok([end_at(pair[0], at[0])?, end_at(pair[1], at[1])?])
+}
+
+/// The end of a sheet at a fraction of its length, which must be 0 or 1.
+fn end_at(sheet: usize, length_fraction: f64) -> Result<LineEnd, ShapeErrorKind> {
+    match length_fraction {
+        0.0 => Ok(LineEnd { line: sheet, end: 0 }),
+        1.0 => Ok(LineEnd { line: sheet, end: 1 }),
+        _ => Err(ShapeErrorKind::NotAnEnd { sheet: sheet + 1, length_fraction }),
+    }
 }
 
 /// The ends of two sheets that are nearest to each other.
 fn nearest_ends(pair: [usize; 2], sheets: &[Vec<usize>], tracks: &[ControlPointTrack], knot: usize) -> [LineEnd; 2] {
-    let at = |side: usize, end: usize| {
-        let sheet = &sheets[pair[side]];
-        tracks[sheet[end * (sheet.len() - 1)]].knot(knot).position
-    };
-    let distance = |ends: &[usize; 2]| at(0, ends[0]).distance_squared(at(1, ends[1]));
-    let all = [[1, 0], [0, 1], [0, 0], [1, 1]];
-    let ends = all.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or([1, 0]);
-    [0, 1].map(|side| LineEnd { line: pair[side], end: ends[side] })
+    let [first, second] = pair.map(|line| {
+        let sheet = &sheets[line];
+        [sheet[0], sheet[sheet.len() - 1]].map(|track| tracks[track].knot(knot).position)
+    });
+    // At equal distance the first of these pairs.
+    let (mut nearest, mut min_squared) = ([1, 0], f64::INFINITY);
+    for ends in [[1, 0], [0, 1], [0, 0], [1, 1]] {
+        let squared = first[ends[0]].distance_squared(second[ends[1]]);
+        if squared < min_squared {
+            (nearest, min_squared) = (ends, squared);
+        }
+    }
+    [0, 1].map(|side| LineEnd { line: pair[side], end: nearest[side] })
 }
 
 /// Strands joined at their ends.
@@ -263,6 +281,25 @@ struct Chains {
 impl Chains {
     fn new(count: usize) -> Self {
         Self { links: vec![[None; 2]; count], chain: (0..count).collect() }
+    }
+
+    /// Joins the strands at two ends of sheets, whose first and last strands are `outer_strands`; returns the strands' ends.
+    fn join_sheets(
+        &mut self,
+        sheet_ends: [LineEnd; 2],
+        outer_strands: &[[usize; 2]],
+    ) -> Result<[LineEnd; 2], ShapeErrorKind> {
+        let strand_ends = sheet_ends.map(|LineEnd { line, end }| LineEnd { line: outer_strands[line][end], end });
+        for (strand_end, sheet_end) in strand_ends.iter().zip(sheet_ends) {
+            if self.links[strand_end.line][strand_end.end].is_some() {
+                return Err(ShapeErrorKind::MergedTwice { sheet: sheet_end.line + 1, is_end: sheet_end.end == 1 });
+            }
+        }
+        if self.join(strand_ends) {
+            Ok(strand_ends)
+        } else {
+            Err(ShapeErrorKind::Ring { sheet: sheet_ends[0].line + 1 })
+        }
     }
 
     /// Joins two ends; `false` if that would close a ring.

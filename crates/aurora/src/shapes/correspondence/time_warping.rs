@@ -27,19 +27,20 @@ pub(crate) struct Anchor {
 pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: f64) -> Vec<f64> {
     let last = points.len() - 1;
     let slots = last * SLOTS_PER_POINT;
-    let fraction = |slot: usize| range[0] + (range[1] - range[0]) * (slot as f64 / slots.max(1) as f64);
-    let line: Vec<DVec2> = (0..=slots).map(|slot| target.at(fraction(slot))).collect();
+    let mut slot_fractions = Vec::with_capacity(slots + 1);
+    for slot in 0..=slots {
+        slot_fractions.push(range[0] + (range[1] - range[0]) * (slot as f64 / slots.max(1) as f64));
+    }
     let scale = target.length() * (range[1] - range[0]).abs();
     if last < 2 || scale == 0.0 {
-        return (0..=last).map(|index| fraction(index * SLOTS_PER_POINT)).collect();
+        return slot_fractions.into_iter().step_by(SLOTS_PER_POINT).collect();
     }
-    let distance_cost = |point: usize, slot: usize| points[point].distance_squared(line[slot]) / (scale * scale);
-    let step_costs: Vec<f64> = (0..=STEP_RANGE[1])
-        .map(|step| {
-            let deviation = step as f64 / SLOTS_PER_POINT as f64 - 1.0;
-            evenness * deviation * deviation
-        })
-        .collect();
+    let line: Vec<DVec2> = slot_fractions.iter().map(|&fraction| target.at(fraction)).collect();
+    let mut step_costs = [0.0; STEP_RANGE[1] + 1];
+    for (step, cost) in step_costs.iter_mut().enumerate() {
+        let deviation = step as f64 / SLOTS_PER_POINT as f64 - 1.0;
+        *cost = evenness * deviation * deviation;
+    }
     let (mut costs, mut next) = (vec![f64::INFINITY; slots + 1], vec![f64::INFINITY; slots + 1]);
     costs[0] = 0.0;
     let mut best = vec![0.0_f64; slots + 1];
@@ -64,14 +65,14 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
         let row = &mut steps[point * (slots + 1)..][..=slots];
         for slot in low..=high {
             row[slot] = best[slot] as u8;
-            next[slot] += distance_cost(point, slot);
+            next[slot] += points[point].distance_squared(line[slot]) / (scale * scale);
         }
         std::mem::swap(&mut costs, &mut next);
     }
     let mut fractions = vec![range[1]; points.len()];
     let mut slot = slots;
     for point in (1..=last).rev() {
-        fractions[point] = fraction(slot);
+        fractions[point] = slot_fractions[slot];
         slot -= usize::from(steps[point * (slots + 1) + slot]).min(slot);
     }
     fractions[0] = range[0];

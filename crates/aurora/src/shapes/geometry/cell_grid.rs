@@ -63,14 +63,10 @@ impl CellGrid {
     /// must be inside the grid.
     pub(super) fn for_each_run(&self, a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut(Range<usize>)) {
         let (top, bottom) = if a.y <= b.y { (a, b) } else { (b, a) };
-        let x_at = |height: f64| {
-            let fraction = ((height - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
-            top.x + (bottom.x - top.x) * fraction
-        };
         for row in self.index_along(1, top.y - margin)..=self.index_along(1, bottom.y + margin) {
             let slab = self.low.y + row as f64 * self.cell;
             let ends = if bottom.y > top.y {
-                [x_at(slab - margin), x_at(slab + self.cell + margin)]
+                [slab - margin, slab + self.cell + margin].map(|y| x_on_segment(top, bottom, y))
             } else {
                 [top.x, bottom.x]
             };
@@ -79,6 +75,12 @@ impl CellGrid {
             visit(row * self.size[0] + left..row * self.size[0] + right + 1);
         }
     }
+}
+
+/// The x at a y of the segment from `top` down to `bottom`; beyond its ends that of the end.
+fn x_on_segment(top: DVec2, bottom: DVec2, y: f64) -> f64 {
+    let fraction = ((y - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
+    top.x + (bottom.x - top.x) * fraction
 }
 
 #[cfg(test)]

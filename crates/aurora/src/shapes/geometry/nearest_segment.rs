@@ -50,9 +50,12 @@ impl NearestSegmentGrid {
         let pairs = shape.sheets.iter().flat_map(|sheet| sheet.points.windows(2));
         let segments: Vec<SegmentGeometry> =
             pairs.zip(0..).map(|(pair, number)| SegmentGeometry::new(number, pair[0], pair[1])).collect();
-        let ends = || segments.iter().flat_map(|segment| [segment.start, segment.start + segment.direction]);
-        let low = ends().fold(DVec2::INFINITY, DVec2::min);
-        let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for segment in &segments {
+            let end = segment.start + segment.direction;
+            low = low.min(segment.start).min(end);
+            high = high.max(segment.start).max(end);
+        }
         let grid = if segments.is_empty() {
             CellGrid::new(DVec2::ZERO, DVec2::ZERO, 1.0, 1)
         } else {
@@ -126,29 +129,32 @@ fn nearest_candidates(grid: &CellGrid, segments: &[SegmentGeometry], reach: f64)
     let slack = (2.0 * 1.001 * grid.half_diagonal()) as f32;
     let max_squares: Vec<f32> =
         min_squares.iter().map(|square| (square.sqrt() + slack) * (square.sqrt() + slack)).collect();
-    let ends = runs.iter().skip(1).map(|run| run.first as usize).chain([squares.len()]);
-    let for_each_kept = |visit: &mut dyn FnMut(usize, u32)| {
-        for (run, end) in runs.iter().zip(ends.clone()) {
-            let distances = &squares[run.first as usize..end];
-            for (cell, square) in (run.cell as usize..).zip(distances) {
-                if *square <= max_squares[cell] {
-                    visit(cell, run.segment);
-                }
-            }
-        }
-    };
+    // A counting sort by cell, in the order of the segments: the first pass counts the candidates, the second stores them.
     let mut starts = vec![0_u32; grid.count() + 1];
-    for_each_kept(&mut |cell, _| starts[cell + 1] += 1);
+    for_each_candidate(&runs, &squares, &max_squares, |cell, _| starts[cell + 1] += 1);
     for cell in 0..grid.count() {
         starts[cell + 1] += starts[cell];
     }
     let mut next = starts.clone();
     let mut lists = vec![SegmentGeometry::new(0, DVec2::ZERO, DVec2::ZERO); starts[grid.count()] as usize];
-    for_each_kept(&mut |cell, segment| {
+    for_each_candidate(&runs, &squares, &max_squares, |cell, segment| {
         lists[next[cell] as usize] = segments[segment as usize];
         next[cell] += 1;
     });
     (starts, lists)
+}
+
+/// Visits each cell with each of its segments whose squared distance is at most the cell's `max_squares`, run by run.
+fn for_each_candidate(runs: &[CellRun], squares: &[f32], max_squares: &[f32], mut visit: impl FnMut(usize, u32)) {
+    for (index, run) in runs.iter().enumerate() {
+        let end = runs.get(index + 1).map_or(squares.len(), |next| next.first as usize);
+        let distances = &squares[run.first as usize..end];
+        for (cell, square) in (run.cell as usize..).zip(distances) {
+            if *square <= max_squares[cell] {
+                visit(cell, run.segment);
+            }
+        }
+    }
 }
 
 impl SegmentGeometry {
@@ -163,6 +169,7 @@ impl SegmentGeometry {
         let from_start = first - self.start;
         let ([x, y], [u, v]) =
             ([from_start.x as f32, from_start.y as f32], [self.direction.x as f32, self.direction.y as f32]);
+        // In f32, twice as many lanes as in f64; the margin of `max_squares` covers the rounding.
         let (spacing, per_square) = (spacing as f32, self.inverse_square.min(f64::from(f32::MAX)) as f32);
         for (index, square) in squares.iter_mut().enumerate() {
             let x = x + spacing * index as f32;

@@ -51,6 +51,11 @@ impl Polyline {
     }
 }
 
+/// Length of the line through `points`.
+pub(crate) fn line_length(points: &[DVec2]) -> f64 {
+    points.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
+}
+
 /// Length of a line up to each of its points.
 pub(crate) fn cumulative_lengths(points: &[DVec2]) -> Vec<f64> {
     let mut lengths = Vec::with_capacity(points.len());
@@ -77,13 +82,14 @@ pub(crate) fn length_fractions(points: &[DVec2]) -> Vec<f64> {
 /// m/n cuts off the end of the stroke; i (m - 1)/(n - 1) reaches it.
 pub(crate) fn resample_by_index(recorded: &[DVec2], count: usize) -> Vec<DVec2> {
     let last = recorded.len().saturating_sub(1);
-    let point = |i: usize| {
+    let mut points = Vec::with_capacity(count);
+    for i in 0..count {
         let index = (i * last) as f64 / (count - 1).max(1) as f64;
         let q = index as usize;
         let p = index - q as f64;
-        recorded[q.min(last)].lerp(recorded[(q + 1).min(last)], p)
-    };
-    (0..count).map(point).collect()
+        points.push(recorded[q.min(last)].lerp(recorded[(q + 1).min(last)], p));
+    }
+    points
 }
 
 /// A centripetal Catmull-Rom spline through the points of a sketch, without cusps or self-intersections within a
@@ -95,9 +101,9 @@ pub(crate) fn smooth_sketch(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
     if !(3..SKETCH_POINTS).contains(&count) {
         return (points, 1);
     }
-    let mirrored = |end: DVec2, inner: DVec2| end + (end - inner);
-    let before = mirrored(points[0], points[1]);
-    let after = mirrored(points[count - 1], points[count - 2]);
+    // Beyond each end, the mirror image of the point next to it.
+    let before = points[0] + (points[0] - points[1]);
+    let after = points[count - 1] + (points[count - 1] - points[count - 2]);
     let mut line = vec![points[0]];
     for index in 0..count - 1 {
         let previous = if index == 0 { before } else { points[index - 1] };
@@ -109,16 +115,24 @@ pub(crate) fn smooth_sketch(points: Vec<DVec2>) -> (Vec<DVec2>, usize) {
     (line, SEGMENTS)
 }
 
-/// The segment between the two inner points (Barry & Goldman 1988).
+/// The segment between the two inner points, by the pyramid of Barry & Goldman (1988).
 fn centripetal([a, b, c, d]: [DVec2; 4], fraction: f64) -> DVec2 {
-    let step = |from: DVec2, to: DVec2| from.distance(to).sqrt().max(1e-9);
-    let [ta, tb] = [0.0, step(a, b)];
-    let tc = tb + step(b, c);
-    let td = tc + step(c, d);
+    let [ta, tb] = [0.0, knot_interval(a, b)];
+    let tc = tb + knot_interval(b, c);
+    let td = tc + knot_interval(c, d);
     let t = lerp(tb, tc, fraction);
-    let between = |p: DVec2, q: DVec2, low: f64, high: f64| p.lerp(q, (t - low) / (high - low));
-    let [ab, bc, cd] = [between(a, b, ta, tb), between(b, c, tb, tc), between(c, d, tc, td)];
-    between(between(ab, bc, ta, tc), between(bc, cd, tb, td), tb, tc)
+    let ab = a.lerp(b, (t - ta) / (tb - ta));
+    let bc = b.lerp(c, (t - tb) / (tc - tb));
+    let cd = c.lerp(d, (t - tc) / (td - tc));
+    let abc = ab.lerp(bc, (t - ta) / (tc - ta));
+    let bcd = bc.lerp(cd, (t - tb) / (td - tb));
+    abc.lerp(bcd, (t - tb) / (tc - tb))
+}
+
+/// Centripetal interval of the spline's parameter between two points: the square root of their distance, and not 0 if
+/// they coincide.
+fn knot_interval(from: DVec2, to: DVec2) -> f64 {
+    from.distance(to).sqrt().max(1e-9)
 }
 
 #[cfg(test)]

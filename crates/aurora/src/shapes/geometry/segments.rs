@@ -64,15 +64,14 @@ impl<'a> SheetSampler<'a> {
         let along = ((distance - start) / (self.ends[index] - start)).clamp(0.0, 1.0);
         let sheet = &self.shape.sheets[id.sheet];
         let [from, to] = [sheet.points[id.segment], sheet.points[id.segment + 1]];
-        let between = |values: &[f64]| lerp(values[id.segment], values[id.segment + 1], along);
         let [first, last] = self.sheets[id.sheet];
         Some(SheetSample {
             point: from.lerp(to, along),
             tangent: (to - from).normalize_or(DVec2::X),
             segment: id,
             fraction: (distance - first) / (last - first),
-            flux: between(&sheet.flux),
-            energy: between(&sheet.energy),
+            flux: lerp(sheet.flux[id.segment], sheet.flux[id.segment + 1], along),
+            energy: lerp(sheet.energy[id.segment], sheet.energy[id.segment + 1], along),
         })
     }
 }

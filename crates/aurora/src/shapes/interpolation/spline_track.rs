@@ -111,6 +111,7 @@ impl Parents {
     }
 }
 
+/// Velocity of a track at each of its knots, km/s: one spline from each held shape to the next.
 fn velocities(
     track: &ControlPointTrack,
     timing: &ShapeTiming,
@@ -119,16 +120,6 @@ fn velocities(
 ) -> Vec<DVec2> {
     let count = track.knots.len();
     let closing_velocity = closed.then(|| closing_velocity(track, timing)).flatten();
-    let end = |knot_index: usize| {
-        if timing.is_held(track.first_shape + knot_index) {
-            return SplineEnd::Velocity(DVec2::ZERO);
-        }
-        match (knot_index, parent_velocities) {
-            (0, Some([velocity, _])) => SplineEnd::Velocity(velocity),
-            (1, Some([_, velocity])) if count == 2 => SplineEnd::Velocity(velocity),
-            _ => closing_velocity.map_or(SplineEnd::Natural, SplineEnd::Velocity),
-        }
-    };
     let mut velocities = vec![DVec2::ZERO; count];
     let mut from = 0;
     while from + 1 < count {
@@ -136,7 +127,17 @@ fn velocities(
         let to = held.unwrap_or(count - 1);
         let spans: Vec<f64> = (from..to).map(|knot_index| timing.span(track.first_shape + knot_index)).collect();
         let positions: Vec<DVec2> = track.knots[from..=to].iter().map(|knot| knot.position).collect();
-        velocities[from..=to].copy_from_slice(&spline(&positions, &spans, [end(from), end(to)]));
+        let ends = [from, to].map(|knot_index| {
+            if timing.is_held(track.first_shape + knot_index) {
+                return SplineEnd::Velocity(DVec2::ZERO);
+            }
+            match (knot_index, parent_velocities) {
+                (0, Some([velocity, _])) => SplineEnd::Velocity(velocity),
+                (1, Some([_, velocity])) if count == 2 => SplineEnd::Velocity(velocity),
+                _ => closing_velocity.map_or(SplineEnd::Natural, SplineEnd::Velocity),
+            }
+        });
+        velocities[from..=to].copy_from_slice(&spline(&positions, &spans, ends));
         from = to;
     }
     velocities
@@ -159,24 +160,17 @@ fn spline(positions: &[DVec2], spans: &[f64], mut ends: [SplineEnd; 2]) -> Vec<D
     if last == 1 && matches!(ends, [SplineEnd::Natural, SplineEnd::Natural]) {
         ends = [SplineEnd::Velocity(DVec2::ZERO); 2];
     }
-    let slope = |knot_index: usize| (positions[knot_index + 1] - positions[knot_index]) / spans[knot_index];
-    // Row i: lower v(i-1) + diagonal v(i) + upper v(i+1) = right.
-    let row = |i: usize| match i {
-        0 => TridiagonalRow::of_end(ends[0], slope(0)),
-        _ if i == last => TridiagonalRow::of_end(ends[1], slope(last - 1)).mirrored(),
-        _ => {
-            let [before, after] = [1.0 / spans[i - 1], 1.0 / spans[i]];
-            TridiagonalRow {
-                lower: before,
-                diagonal: 2.0 * (before + after),
-                upper: after,
-                right: 3.0 * (slope(i - 1) * before + slope(i) * after),
-            }
-        }
-    };
+    let slopes: Vec<DVec2> = positions.windows(2).zip(spans).map(|(pair, span)| (pair[1] - pair[0]) / *span).collect();
     let (mut ratios, mut values): (Vec<f64>, Vec<DVec2>) = (Vec::new(), Vec::new());
     for i in 0..=last {
-        let TridiagonalRow { lower, diagonal, upper, right } = row(i);
+        let row = if i == 0 {
+            TridiagonalRow::of_end(ends[0], slopes[0])
+        } else if i == last {
+            TridiagonalRow::of_end(ends[1], slopes[last - 1]).mirrored()
+        } else {
+            TridiagonalRow::of_inner([spans[i - 1], spans[i]], [slopes[i - 1], slopes[i]])
+        };
+        let TridiagonalRow { lower, diagonal, upper, right } = row;
         let (ratio, value) = if i == 0 { (0.0, DVec2::ZERO) } else { (ratios[i - 1], values[i - 1]) };
         let pivot = diagonal - lower * ratio;
         ratios.push(upper / pivot);
@@ -189,7 +183,7 @@ fn spline(positions: &[DVec2], spans: &[f64], mut ends: [SplineEnd; 2]) -> Vec<D
     values
 }
 
-/// A row of a tridiagonal system.
+/// A row of a tridiagonal system: lower v(i-1) + diagonal v(i) + upper v(i+1) = right.
 struct TridiagonalRow {
     lower: f64,
     diagonal: f64,
@@ -199,6 +193,18 @@ struct TridiagonalRow {
 }
 
 impl TridiagonalRow {
+    /// The row of an inner knot, for the time spans and slopes of the segments before and after it: the second derivative
+    /// is continuous there.
+    fn of_inner(spans: [f64; 2], slopes: [DVec2; 2]) -> Self {
+        let [before, after] = [1.0 / spans[0], 1.0 / spans[1]];
+        Self {
+            lower: before,
+            diagonal: 2.0 * (before + after),
+            upper: after,
+            right: 3.0 * (slopes[0] * before + slopes[1] * after),
+        }
+    }
+
     /// The first row, for a boundary condition and the slope of the first segment.
     fn of_end(end: SplineEnd, slope: DVec2) -> Self {
         match end {

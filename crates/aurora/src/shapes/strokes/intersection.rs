@@ -80,9 +80,11 @@ fn segments<S: AsRef<[DVec2]>>(sheets: &[S]) -> Vec<SheetSegment> {
 
 /// Cells about as long as a segment, and not many more cells than segments, since all are cleared.
 fn grid(segments: &[SheetSegment]) -> CellGrid {
-    let ends = || segments.iter().flat_map(|segment| segment.ends);
-    let low = ends().fold(DVec2::INFINITY, DVec2::min);
-    let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for end in segments.iter().flat_map(|segment| segment.ends) {
+        low = low.min(end);
+        high = high.max(end);
+    }
     let length: f64 = segments.iter().map(|segment| segment.ends[0].distance(segment.ends[1])).sum();
     CellGrid::new(low, high, length / segments.len() as f64, (4 * segments.len()).isqrt() + 16)
 }
@@ -106,6 +108,7 @@ fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit
             let mut link = heads[cell];
             while link != NONE {
                 let (other, next) = links[link as usize];
+                // Two segments may share several cells, but are compared once.
                 if compared_with[other as usize] != index as u32 {
                     compared_with[other as usize] = index as u32;
                     let follows = segment.continues && other as usize + 1 == index;
@@ -118,6 +121,7 @@ fn for_each_meeting<S: AsRef<[DVec2]>>(sheets: &[S], meeting: Meeting, mut visit
             links.push((index as u32, heads[cell]));
             heads[cell] = links.len() as u32 - 1;
         });
+        // Cells list them in another order.
         met.sort_unstable();
         if !met.drain(..).all(|other| visit([segments[other as usize].id, segment.id])) {
             return;
@@ -130,6 +134,12 @@ fn orient2d(a: DVec2, b: DVec2, point: DVec2) -> f64 {
     (b - a).perp_dot(point - a)
 }
 
+/// Whether one is positive and the other negative; their product could underflow to 0.
+fn have_opposite_signs(x: f64, y: f64) -> bool {
+    (x < 0.0 && y > 0.0) || (x > 0.0 && y < 0.0)
+}
+
+/// Whether two segments intersect; `follows` if the second continues the first.
 fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Meeting) -> bool {
     let [[a, b], [c, d]] = [first.ends, second.ends];
     if follows {
@@ -137,7 +147,6 @@ fn meets(first: &SheetSegment, second: &SheetSegment, follows: bool, meeting: Me
         return meeting == Meeting::Touching && orient2d(a, b, d) == 0.0 && (b - a).dot(d - c) < 0.0;
     }
     let [c_side, d_side, a_side, b_side] = [orient2d(a, b, c), orient2d(a, b, d), orient2d(c, d, a), orient2d(c, d, b)];
-    let have_opposite_signs = |x: f64, y: f64| (x < 0.0 && y > 0.0) || (x > 0.0 && y < 0.0);
     if have_opposite_signs(c_side, d_side) && have_opposite_signs(a_side, b_side) {
         return true;
     }
@@ -158,22 +167,37 @@ const MAX_RELATIVE_DISTANCE: f64 = 1.5;
 /// points.
 pub(crate) fn passes(before: &Shape, after: &Shape) -> bool {
     let count = before.sheets.len();
-    let same_points = |(a, b): (&Sheet, &Sheet)| a.points.len() == b.points.len();
-    if count > MAX_SHEETS || count != after.sheets.len() || !before.sheets.iter().zip(&after.sheets).all(same_points) {
+    let sheets = before.sheets.iter().zip(&after.sheets);
+    if count > MAX_SHEETS
+        || count != after.sheets.len()
+        || sheets.clone().any(|(before, after)| before.points.len() != after.points.len())
+    {
         return false;
     }
-    let pairs =
-        || (0..count).flat_map(|one| (0..count).filter(move |other| *other != one).map(move |other| (one, other)));
-    pairs().any(|(one, other)| {
-        let [one, other] = [one, other].map(|sheet| [&before.sheets[sheet].points[..], &after.sheets[sheet].points]);
-        let max_motion = other[0].iter().zip(other[1]).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-        TESTED_QUARTERS.iter().any(|quarters| {
-            let point = one.map(|points| points[quarters * (points.len() - 1) / 4]);
-            let sides = [0, 1].map(|time| signed_distance(point[time], other[time]));
-            let [Some(was), Some(is)] = sides else { return false };
-            was * is < 0.0 && was.abs() + is.abs() < MAX_RELATIVE_DISTANCE * (max_motion + point[0].distance(point[1]))
-        })
-    })
+    for (index, one) in sheets.clone().enumerate() {
+        for (other_index, other) in sheets.clone().enumerate() {
+            if other_index != index && passes_sheet([one.0, one.1], [other.0, other.1]) {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// Whether a sheet is on the other side of another at the later of two times.
+fn passes_sheet(one: [&Sheet; 2], other: [&Sheet; 2]) -> bool {
+    let [one, other] = [one, other].map(|sheets| sheets.map(|sheet| &sheet.points[..]));
+    let max_motion = other[0].iter().zip(other[1]).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    for quarters in TESTED_QUARTERS {
+        let point = one.map(|points| points[quarters * (points.len() - 1) / 4]);
+        let sides = [0, 1].map(|time| signed_distance(point[time], other[time]));
+        let [Some(was), Some(is)] = sides else { continue };
+        let max_distance = MAX_RELATIVE_DISTANCE * (max_motion + point[0].distance(point[1]));
+        if was * is < 0.0 && was.abs() + is.abs() < max_distance {
+            return true;
+        }
+    }
+    false
 }
 
 /// Signed distance of a point from a polyline; `None` beyond its ends.

@@ -67,10 +67,15 @@ impl ShapeContext {
         ShapeError { key: format!("shapes.{}{key}", self.shape), kind }
     }
 
+    /// An error at an entry of `sheets`, or at a key of it, with its point.
+    fn error_in_entry(self, entry: usize, key: &str, kind: ShapeErrorKind) -> ShapeError {
+        self.error(&format!(".sheets.{entry}{key}"), kind)
+    }
+
     /// An error at a point of a sheet.
     fn error_at(self, sheet: &DrawnSheet, point: usize, kind: ShapeErrorKind) -> ShapeError {
         let point = if sheet.lists_points { format!(".points.{}", sheet.origin(point)) } else { String::new() };
-        self.error(&format!(".sheets.{}{point}", sheet.entry), kind)
+        self.error_in_entry(sheet.entry, &point, kind)
     }
 }
 
@@ -107,23 +112,23 @@ fn draw_entry(
     assets: &dyn Assets,
     sheets: &mut Vec<DrawnSheet>,
 ) -> Result<(), ShapeError> {
-    let error_for = |key: &str, kind| context.error(&format!(".sheets.{entry}{key}"), kind);
     if parameters.svg_path_id.is_some() && parameters.svg_file.is_none() {
-        return Err(error_for(".svg_path_id", ShapeErrorKind::StrokeWithoutFile));
+        return Err(context.error_in_entry(entry, ".svg_path_id", ShapeErrorKind::StrokeWithoutFile));
     }
     let strokes = match (&parameters.points, &parameters.svg_file, parameters.form) {
         (Some(points), None, None) => vec![points.iter().map(|&point| DVec2::from(point)).collect()],
         (None, Some(path), None) => {
             let id = parameters.svg_path_id.as_deref();
             strokes(&path.0, id, context.extent_km, assets).map_err(|error| {
-                error_for(
-                    if matches!(error.problem, AssetProblem::NoStroke(_)) { ".svg_path_id" } else { ".svg_file" },
-                    error.into(),
-                )
+                let is_missing = matches!(error.problem, AssetProblem::NoStroke(_));
+                context.error_in_entry(entry, if is_missing { ".svg_path_id" } else { ".svg_file" }, error.into())
             })?
         }
         (None, None, _) => vec![form_line(parameters, context.extent_km)],
-        _ => return Err(error_for("", ShapeErrorKind::SeveralSources { sheet: sheets.len() + 1 })),
+        _ => {
+            let kind = ShapeErrorKind::SeveralSources { sheet: sheets.len() + 1 };
+            return Err(context.error_in_entry(entry, "", kind));
+        }
     };
     let factors = FluxEnergyFactors::new(parameters);
     for copy in 0..parameters.copies {
@@ -132,7 +137,7 @@ fn draw_entry(
             let points = stroke.iter().map(|&point| transformed(point, offset, parameters)).collect();
             let sheet = sheet(points, parameters, entry, factors.clone()).map_err(|found| {
                 let key = if parameters.points.is_some() { ".points" } else { "" };
-                error_for(key, ShapeErrorKind::TooFewPoints { sheet: sheets.len() + 1, found })
+                context.error_in_entry(entry, key, ShapeErrorKind::TooFewPoints { sheet: sheets.len() + 1, found })
             })?;
             sheets.push(sheet);
         }
@@ -164,12 +169,17 @@ fn sheet(
     Ok(DrawnSheet { line, recorded, origins, pieces, factors, entry, lists_points: parameters.points.is_some() })
 }
 
+/// The line of a named form, km.
 fn form_line(parameters: &SheetParameters, extent_km: f64) -> Vec<DVec2> {
-    let set = |auto: Auto<f64>| if let Auto::Set(value) = auto { Some(value) } else { None };
-    let count = if let Auto::Set(count) = parameters.wave_count { Some(count) } else { None };
-    let length = set(parameters.length_km).unwrap_or(DEFAULT_FORM_LENGTH * extent_km);
-    let line = parameters.form.unwrap_or_default().line(set(parameters.bend_deg), count);
+    let length = set_value(parameters.length_km).unwrap_or(DEFAULT_FORM_LENGTH * extent_km);
+    let form = parameters.form.unwrap_or_default();
+    let line = form.line(set_value(parameters.bend_deg), set_value(parameters.wave_count));
     line.into_iter().map(|point| point * length).collect()
+}
+
+/// The value that the scene sets.
+fn set_value<T>(auto: Auto<T>) -> Option<T> {
+    if let Auto::Set(value) = auto { Some(value) } else { None }
 }
 
 /// Applies scale, mirror, rotation and translation, in this order; a copy is offset to the south before the rotation.
@@ -204,10 +214,9 @@ fn fitted(points: &[DVec2], drawing: &Drawing, extent_km: f64) -> Vec<DVec2> {
 /// Given points are checked first, so that the error names one of them; then the smoothed line.
 fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeError> {
     let half = context.extent_km / 2.0;
-    let outside = |point: &DVec2| point.abs().max_element() > half;
     for (index, sheet) in sheets.iter().enumerate() {
-        let recorded_outside = sheet.recorded.iter().position(outside).map(|at| at * sheet.pieces);
-        let Some(at) = recorded_outside.or_else(|| sheet.line.points().iter().position(outside)) else { continue };
+        let recorded_outside = first_outside(&sheet.recorded, half).map(|at| at * sheet.pieces);
+        let Some(at) = recorded_outside.or_else(|| first_outside(sheet.line.points(), half)) else { continue };
         let point = sheet.line.points()[at];
         let number = sheet.origin(at) + 1;
         let (x, z, sheet_number) = (point.x, point.y, index + 1);
@@ -221,19 +230,21 @@ fn check_extent(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), Shap
     Ok(())
 }
 
+/// Index of the first point outside a square about the origin whose sides are `2 half` long.
+fn first_outside(points: &[DVec2], half: f64) -> Option<usize> {
+    points.iter().position(|point| point.abs().max_element() > half)
+}
+
 fn check_crossings(sheets: &[DrawnSheet], context: ShapeContext) -> Result<(), ShapeError> {
     let lines: Vec<&[DVec2]> = sheets.iter().map(|sheet| sheet.line.points()).collect();
     let Some([earlier, later]) = first_crossing(&lines) else { return Ok(()) };
-    let point = |at: SegmentId| sheets[at.sheet].origin(at.segment) + 1;
-    let kind = if earlier.sheet == later.sheet {
-        ShapeErrorKind::CrossesItself { sheet: later.sheet + 1, point: point(later), earlier: point(earlier) }
+    // Counted from 1, as in messages.
+    let [(sheet, point), (other, other_point)] =
+        [later, earlier].map(|at: SegmentId| (at.sheet + 1, sheets[at.sheet].origin(at.segment) + 1));
+    let kind = if sheet == other {
+        ShapeErrorKind::CrossesItself { sheet, point, earlier: other_point }
     } else {
-        ShapeErrorKind::CrossesSheet {
-            sheet: later.sheet + 1,
-            point: point(later),
-            other: earlier.sheet + 1,
-            other_point: point(earlier),
-        }
+        ShapeErrorKind::CrossesSheet { sheet, point, other, other_point }
     };
     Err(context.error_at(&sheets[later.sheet], later.segment, kind))
 }
@@ -264,13 +275,19 @@ impl FluxEnergyFactors {
     /// Whether both are equal at sampled positions.
     pub(crate) fn approximately_equals(&self, other: &Self) -> bool {
         const SAMPLES: usize = 512;
-        let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
-        let same_at = |fraction: f64| {
-            let [a, b] = [self.at(fraction), other.at(fraction)];
-            near(a[0], b[0]) && near(a[1], b[1])
-        };
-        (self.curves == other.curves && self.fade == other.fade)
-            || (0..=SAMPLES).all(|sample| same_at(sample as f64 / SAMPLES as f64))
+        if self.curves == other.curves && self.fade == other.fade {
+            return true;
+        }
+        for sample in 0..=SAMPLES {
+            let fraction = sample as f64 / SAMPLES as f64;
+            for (a, b) in self.at(fraction).into_iter().zip(other.at(fraction)) {
+                let is_near = (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+                if !is_near {
+                    return false;
+                }
+            }
+        }
+        true
     }
 }
 

@@ -53,8 +53,15 @@ pub(super) struct DecayFactors<const ALTITUDES: usize> {
 impl<const ALTITUDES: usize> DecayFactors<ALTITUDES> {
     /// For a step in s and lifetimes in s by energy and altitude.
     pub(super) fn new(seconds: f64, lifetimes: impl Fn(f64) -> [f64; ALTITUDES]) -> Self {
-        let kept = |lifetime: f64| if lifetime > 0.0 { math::exp(-seconds / lifetime) as f32 } else { 0.0 };
-        Self { nodes: (0..NODES).map(|node| lifetimes(node_energy_ev(node)).map(kept)).collect() }
+        let mut nodes = vec![[0.0; ALTITUDES]; NODES];
+        for (node, factors) in nodes.iter_mut().enumerate() {
+            for (factor, lifetime) in factors.iter_mut().zip(lifetimes(node_energy_ev(node))) {
+                if lifetime > 0.0 {
+                    *factor = math::exp(-seconds / lifetime) as f32;
+                }
+            }
+        }
+        Self { nodes }
     }
 
     /// Decay to 0 in one step: the light follows the power at once.
@@ -76,8 +83,34 @@ impl<const ALTITUDES: usize> Tile<ALTITUDES> {
 
     /// Power-weighted mean electron energy, eV.
     fn energy_ev(&self) -> f32 {
-        let sum = |values: &[[f32; ALTITUDES]; TILE_CELLS]| values.as_flattened().iter().sum::<f32>();
-        sum(&self.weighted) / sum(&self.powers).max(f32::MIN_POSITIVE)
+        let [weighted, power] = [&self.weighted, &self.powers].map(|values| values.as_flattened().iter().sum::<f32>());
+        weighted / power.max(f32::MIN_POSITIVE)
+    }
+
+    /// Applies the decay of one step. Returns the gain of the particles' power, and whether the tile is dark: no cell has as
+    /// much power as `dark_w` would add.
+    fn fade(&mut self, decay: &DecayFactors<ALTITUDES>, dark_w: f32) -> ([f32; ALTITUDES], bool) {
+        let kept = decay.of(self.energy_ev());
+        for values in self.powers.iter_mut().chain(&mut self.weighted) {
+            for (value, kept) in values.iter_mut().zip(kept) {
+                *value *= kept;
+            }
+        }
+        let gain = kept.map(|kept| 1.0 - kept);
+        let is_dark =
+            self.powers.iter().all(|powers| powers.iter().zip(gain).all(|(power, gain)| *power < dark_w * gain));
+        (gain, is_dark)
+    }
+
+    /// Sums of the powers and of their squares over cells and altitudes of all `tiles`.
+    fn power_moments(tiles: &[Self]) -> [f64; 2] {
+        let [mut sum, mut squares] = [0.0; 2];
+        for power in tiles.iter().flat_map(|tile| tile.powers.as_flattened()) {
+            let power = f64::from(*power);
+            sum += power;
+            squares += power * power;
+        }
+        [sum, squares]
     }
 }
 
@@ -129,49 +162,59 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
 
     /// Merges the `selected(tile, cell)` cells into blocks of `block` by `block`, a divisor of [`TILE_SIDE`].
     fn blocks(&self, block: usize, selected: impl Fn(usize, usize) -> bool + Sync) -> Vec<AfterglowCell<ALTITUDES>> {
-        let of_tiles = |(task, tiles): (usize, &[Tile<ALTITUDES>])| {
-            let mut blocks = Vec::new();
-            for (tile, number) in tiles.iter().zip(task * TILES_PER_TASK..) {
-                // Output index of each block.
-                let mut numbers = [usize::MAX; TILE_CELLS];
-                for cell in (0..TILE_CELLS).filter(|cell| selected(number, *cell)) {
-                    let Some(mut lit) = self.cell(tile, cell) else { continue };
-                    let [column, row] = self.column_and_row(tile, cell).map(|position| position / block * block);
-                    lit.cell_index = self.number_of([column, row]);
-                    let block_number = &mut numbers[cell / TILE_SIDE / block * TILE_SIDE + cell % TILE_SIDE / block];
-                    if *block_number == usize::MAX {
-                        *block_number = blocks.len();
-                        blocks.push(lit);
-                    } else {
-                        blocks[*block_number] = AfterglowCell::merged_with(blocks[*block_number], lit);
-                    }
+        let tasks = self.tiles.par_chunks(TILES_PER_TASK).enumerate();
+        let blocks: Vec<Vec<AfterglowCell<ALTITUDES>>> = tasks
+            .map(|(task, tiles)| {
+                let mut blocks = Vec::new();
+                for (tile, number) in tiles.iter().zip(task * TILES_PER_TASK..) {
+                    self.add_blocks_of_tile(tile, block, |cell| selected(number, cell), &mut blocks);
                 }
+                blocks
+            })
+            .collect();
+        blocks.concat()
+    }
+
+    /// Appends the blocks of a tile's `selected(cell)` cells.
+    fn add_blocks_of_tile(
+        &self,
+        tile: &Tile<ALTITUDES>,
+        block: usize,
+        selected: impl Fn(usize) -> bool,
+        blocks: &mut Vec<AfterglowCell<ALTITUDES>>,
+    ) {
+        // Output index of each block.
+        let mut numbers = [usize::MAX; TILE_CELLS];
+        for cell in (0..TILE_CELLS).filter(|cell| selected(*cell)) {
+            let Some(mut lit) = self.cell(tile, cell) else { continue };
+            let [column, row] = self.column_and_row(tile, cell).map(|position| position / block * block);
+            lit.cell_index = self.number_of([column, row]);
+            let block_number = &mut numbers[cell / TILE_SIDE / block * TILE_SIDE + cell % TILE_SIDE / block];
+            if *block_number == usize::MAX {
+                *block_number = blocks.len();
+                blocks.push(lit);
+            } else {
+                blocks[*block_number] = AfterglowCell::merged_with(blocks[*block_number], lit);
             }
-            blocks
-        };
-        let partial_sums: Vec<Vec<AfterglowCell<ALTITUDES>>> =
-            self.tiles.par_chunks(TILES_PER_TASK).enumerate().map(of_tiles).collect();
-        partial_sums.concat()
+        }
     }
 
     /// Storage index of each particle's cell; out of range where there is no tile.
     fn cells_of(&self, particles: &AuroraParticles) -> Vec<u32> {
         let [xs, zs] = &particles.positions;
-        let cell = |(x, z): (&f32, &f32)| {
-            let (position, cell) = self.locate([*x, *z]);
-            self.numbers[position].saturating_mul(TILE_CELLS as u32).saturating_add(cell as u32)
-        };
-        xs.par_iter().zip(zs).map(cell).collect()
+        let located = xs.par_iter().zip(zs).map(|(x, z)| self.locate([*x, *z]));
+        // Saturates for `NO_TILE`.
+        located
+            .map(|(position, cell)| {
+                self.numbers[position].saturating_mul(TILE_CELLS as u32).saturating_add(cell as u32)
+            })
+            .collect()
     }
 
     /// Power-weighted mean power of a cell, W, which is insensitive to many faint cells.
     fn typical_w(&self) -> f32 {
-        let of_tiles = |tiles: &[Tile<ALTITUDES>]| {
-            let powers = tiles.iter().flat_map(|tile| tile.powers.as_flattened()).map(|power| f64::from(*power));
-            powers.fold([0.0; 2], |[sum, squares], power| [sum + power, squares + power * power])
-        };
         // Fixed chunks, so that the sum does not depend on the number of threads.
-        let partial_sums: Vec<[f64; 2]> = self.tiles.par_chunks(TILES_PER_TASK).map(of_tiles).collect();
+        let partial_sums: Vec<[f64; 2]> = self.tiles.par_chunks(TILES_PER_TASK).map(Tile::power_moments).collect();
         let [sum, squares] =
             partial_sums.iter().fold([0.0; 2], |total, chunk| [total[0] + chunk[0], total[1] + chunk[1]]);
         (squares / f64::max(sum, f64::MIN_POSITIVE)) as f32
@@ -188,8 +231,12 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
     /// Tile positions, and per tile the powers and the powers times energy of its cells.
     pub(crate) fn to_arrays(&self) -> (Vec<u32>, Vec<f32>) {
         let positions = self.tiles.iter().map(|tile| tile.tile_position).collect();
-        let values = |tile: &Tile<ALTITUDES>| tile.powers.into_iter().chain(tile.weighted).flatten();
-        (positions, self.tiles.iter().flat_map(values).collect())
+        let mut values = Vec::with_capacity(self.tiles.len() * 2 * TILE_CELLS * ALTITUDES);
+        for tile in &self.tiles {
+            values.extend_from_slice(tile.powers.as_flattened());
+            values.extend_from_slice(tile.weighted.as_flattened());
+        }
+        (positions, values)
     }
 
     /// Inverse of [`Self::to_arrays`] for a map of this layout; `None` for inconsistent arrays.
@@ -203,8 +250,10 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         for (position, values) in positions.iter().zip(tiles) {
             let number = map.numbers.get_mut(*position as usize).filter(|number| **number == NO_TILE)?;
             *number = map.tiles.len() as u32;
-            let half = |start: usize| std::array::from_fn(|cell| values[start + cell]);
-            map.tiles.push(Tile { tile_position: *position, powers: half(0), weighted: half(TILE_CELLS) });
+            let mut tile = Tile::new(*position);
+            tile.powers.copy_from_slice(&values[..TILE_CELLS]);
+            tile.weighted.copy_from_slice(&values[TILE_CELLS..]);
+            map.tiles.push(tile);
         }
         Some(map)
     }
@@ -215,18 +264,23 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         [position % self.side * TILE_SIDE + cell % TILE_SIDE, position / self.side * TILE_SIDE + cell / TILE_SIDE]
     }
 
+    /// Row-major index of a cell in the map.
     fn number_of(&self, [column, row]: [usize; 2]) -> u32 {
         (row * self.side * TILE_SIDE + column) as u32
+    }
+
+    /// Coordinate of the middle of a column or row, km.
+    fn middle_km(&self, index: usize) -> f32 {
+        ((index as f64 + 0.5) * self.cell_km - self.half_km) as f32
     }
 
     fn cell(&self, tile: &Tile<ALTITUDES>, cell: usize) -> Option<AfterglowCell<ALTITUDES>> {
         let powers_w = tile.powers[cell];
         let whole: f32 = powers_w.iter().sum();
         let [column, row] = self.column_and_row(tile, cell);
-        let middle = |cells: usize| ((cells as f64 + 0.5) * self.cell_km - self.half_km) as f32;
         (whole > 0.0).then(|| AfterglowCell {
             cell_index: self.number_of([column, row]),
-            position_km: [middle(column), middle(row)],
+            position_km: [self.middle_km(column), self.middle_km(row)],
             powers_w,
             energy_ev: tile.weighted[cell].iter().sum::<f32>() / whole,
         })
@@ -241,17 +295,8 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
 
     /// Applies the decay and frees dark tiles; returns the gain of the particles' power for each remaining tile.
     fn fade(&mut self, decay: &DecayFactors<ALTITUDES>, dark_w: f32) -> Vec<[f32; ALTITUDES]> {
-        let fade = |tile: &mut Tile<ALTITUDES>| {
-            let kept = decay.of(tile.energy_ev());
-            for values in tile.powers.iter_mut().chain(&mut tile.weighted) {
-                values.iter_mut().zip(kept).for_each(|(value, kept)| *value *= kept);
-            }
-            let gain = kept.map(|kept| 1.0 - kept);
-            let is_dark = |powers: &[f32; ALTITUDES]| (0..ALTITUDES).all(|i| powers[i] < dark_w * gain[i]);
-            (gain, tile.powers.iter().all(is_dark))
-        };
-        let (mut gain, mut dark): (Vec<_>, Vec<_>) =
-            self.tiles.par_iter_mut().with_min_len(TILES_PER_TASK).map(fade).unzip();
+        let tiles = self.tiles.par_iter_mut().with_min_len(TILES_PER_TASK);
+        let (mut gain, mut dark): (Vec<_>, Vec<_>) = tiles.map(|tile| tile.fade(decay, dark_w)).unzip();
         let mut number = 0;
         while number < self.tiles.len() {
             if dark[number] {
@@ -322,13 +367,15 @@ impl<const ALTITUDES: usize> AfterglowCell<ALTITUDES> {
     fn merged_with(self, other: Self) -> Self {
         let whole = [self, other].map(|cell| cell.powers_w.iter().sum::<f32>());
         let fraction = whole[1] / (whole[0] + whole[1]);
-        let mean = |first: f32, second: f32| first + fraction * (second - first);
-        Self {
-            cell_index: self.cell_index,
-            position_km: [0, 1].map(|axis| mean(self.position_km[axis], other.position_km[axis])),
-            powers_w: std::array::from_fn(|height| self.powers_w[height] + other.powers_w[height]),
-            energy_ev: mean(self.energy_ev, other.energy_ev),
+        let mut merged = self;
+        for (position, other) in merged.position_km.iter_mut().zip(other.position_km) {
+            *position += fraction * (other - *position);
         }
+        for (power, other) in merged.powers_w.iter_mut().zip(other.powers_w) {
+            *power += other;
+        }
+        merged.energy_ev += fraction * (other.energy_ev - self.energy_ev);
+        merged
     }
 }
 
@@ -349,16 +396,21 @@ impl AfterglowMap<1> {
                 *sum += power;
             }
         }
-        let power_of = |(cell, power): (&u32, &f32)| {
-            let cell = *cell as usize;
-            let sum = sums.get(cell).copied().unwrap_or_default();
-            if sum > 0.0 { self.tiles[cell / TILE_CELLS].powers[cell % TILE_CELLS][0] * (power / sum) } else { 0.0 }
-        };
-        let powers = cells.par_iter().zip(&particles.powers_w).map(power_of).collect();
+        let powers = cells
+            .par_iter()
+            .zip(&particles.powers_w)
+            .map(|(cell, power)| {
+                let cell = *cell as usize;
+                let sum = sums.get(cell).copied().unwrap_or_default();
+                if sum > 0.0 { self.tiles[cell / TILE_CELLS].powers[cell % TILE_CELLS][0] * (power / sum) } else { 0.0 }
+            })
+            .collect();
         let min_power = min_relative_power * self.typical_w();
-        let is_empty = |tile: usize, cell: usize| sums[tile * TILE_CELLS + cell] <= 0.0;
-        let lit = |tile: usize, cell: usize| is_empty(tile, cell) && self.tiles[tile].powers[cell][0] > min_power;
-        (powers, self.blocks(block, lit))
+        let rest = self.blocks(block, |tile, cell| {
+            let is_empty = sums[tile * TILE_CELLS + cell] <= 0.0;
+            is_empty && self.tiles[tile].powers[cell][0] > min_power
+        });
+        (powers, rest)
     }
 }
 

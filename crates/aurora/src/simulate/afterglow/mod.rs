@@ -25,9 +25,11 @@ pub(crate) struct AfterglowDecay {
 impl AfterglowDecay {
     /// For a step in s of the aurora's time; lifetimes are from `emission`.
     pub(crate) fn new(emission: &Emission, seconds: f64) -> Self {
-        let green = |energy_ev| [emission.column(energy_ev).lifetime[SpectralEmitter::OxygenGreen.index()]];
-        let red = |energy_ev| emission.red_lifetimes(energy_ev);
-        Self { green: DecayFactors::new(seconds, green), red: DecayFactors::new(seconds, red) }
+        let green = SpectralEmitter::OxygenGreen.index();
+        Self {
+            green: DecayFactors::new(seconds, |energy_ev| [emission.column(energy_ev).lifetime[green]]),
+            red: DecayFactors::new(seconds, |energy_ev| emission.red_lifetimes(energy_ev)),
+        }
     }
 }
 

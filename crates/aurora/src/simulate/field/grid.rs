@@ -103,11 +103,14 @@ impl Grid2 {
     pub fn gradient(&self) -> Gradient2 {
         let [columns, rows] = self.layout.size;
         let half = 0.5 / self.layout.spacing;
-        let at = |index: usize| {
-            let (i, j) = ((index % columns) as isize, (index / columns) as isize);
-            [half * (self.at(i + 1, j) - self.at(i - 1, j)), half * (self.at(i, j + 1) - self.at(i, j - 1))]
-        };
-        Gradient2 { layout: self.layout, values: (0..columns * rows).map(at).collect() }
+        let mut values = Vec::with_capacity(columns * rows);
+        for j in 0..rows as isize {
+            for i in 0..columns as isize {
+                let [along_x, along_z] = [self.at(i + 1, j) - self.at(i - 1, j), self.at(i, j + 1) - self.at(i, j - 1)];
+                values.push([half * along_x, half * along_z]);
+            }
+        }
+        Gradient2 { layout: self.layout, values }
     }
 }
 
@@ -125,17 +128,21 @@ impl Gradient2 {
         &self.values
     }
 
+    /// The gradient in a cell; outside of the grid that in the nearest one.
+    fn at(&self, column: isize, row: isize) -> [f64; 2] {
+        let [columns, rows] = self.layout.size.map(|count| count as isize);
+        let (column, row) = (column.clamp(0, columns - 1), row.clamp(0, rows - 1));
+        self.values[(row * columns + column) as usize]
+    }
+
     /// Bilinear interpolation between cell centers, clamped to the outermost.
     #[must_use]
     pub fn sample(&self, position: [f64; 2]) -> [f64; 2] {
-        let [columns, rows] = self.layout.size;
         if self.values.is_empty() {
             return [0.0; 2];
         }
         let ([i, j], [s, t]) = self.layout.split(position);
-        let clamped = |cell: isize, count: usize| cell.clamp(0, count as isize - 1) as usize;
-        let at = |i: isize, j: isize| self.values[clamped(j, rows) * columns + clamped(i, columns)];
-        let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
+        let (a, b, c, d) = (self.at(i, j), self.at(i + 1, j), self.at(i, j + 1), self.at(i + 1, j + 1));
         std::array::from_fn(|k| {
             let (lower, upper) = (s.mul_add(b[k] - a[k], a[k]), s.mul_add(d[k] - c[k], c[k]));
             t.mul_add(upper - lower, lower)

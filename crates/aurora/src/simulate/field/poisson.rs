@@ -47,11 +47,12 @@ impl PoissonSolver {
     pub fn new(size: [usize; 2], spacing: f64, screening: f64) -> Self {
         let [columns, rows] = size;
         let area = spacing * spacing;
-        let diagonal = |k: usize| {
+        // Eigenvalues of the equation along x, for wave number k + 1: 2 + area / l^2 + 4 sin^2(pi (k + 1) / (2 (columns + 1))).
+        let mut diagonals = vec![0.0; columns];
+        for (k, diagonal) in diagonals.iter_mut().enumerate() {
             let sine = math::sin(PI * (k + 1) as f64 / (2 * (columns + 1)) as f64);
-            (4.0 * sine).mul_add(sine, area.mul_add(screening, 2.0))
-        };
-        let diagonals: Vec<f64> = (0..columns).map(diagonal).collect();
+            *diagonal = (4.0 * sine).mul_add(sine, area.mul_add(screening, 2.0));
+        }
         let mut factors = Vec::with_capacity(columns * rows);
         let mut above = vec![0.0; columns];
         for _ in 0..rows {

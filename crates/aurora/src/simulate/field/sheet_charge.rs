@@ -97,25 +97,38 @@ impl SheetCharge {
 
     /// Adjusts charge and tilt toward the target potential and equal potentials at both edges.
     pub(super) fn adjust_toward(&mut self, refined: &RefinedShape, potential: &Grid2, target: ChargeTarget) {
-        let ChargeTarget { density, half_thickness, .. } = target;
         let starts = &self.starts;
-        let adjust = |(index, (charge, tilt)): (usize, (&mut f64, &mut f64))| {
+        let nodes = self.nodes.par_iter_mut().zip(&mut self.tilts).with_min_len(TASK).enumerate();
+        nodes.for_each(|(index, (charge, tilt))| {
             let sheet = starts.partition_point(|start| *start <= index) - 1;
-            let last = (starts[sheet + 1] - starts[sheet] - 1) as f64;
-            let fraction = (index - starts[sheet]) as f64 / last;
-            let position = refined.position(sheet, fraction);
-            let found = potential.sample(position.to_array());
-            let change = if found < 0.0 { target.potential / found } else { CHANGE[1] };
-            *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
-            let chord = refined.position(sheet, fraction + 0.5 / last) - refined.position(sheet, fraction - 0.5 / last);
-            let across = chord.perp().normalize_or_zero() * half_thickness;
-            let rise =
-                potential.sample((position + across).to_array()) - potential.sample((position - across).to_array());
-            // A tilt a of the charge lowers one edge relative to the other by 2/3 a density L^2.
-            let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
-            *tilt = (*tilt + change).clamp(-MAX_TILT, MAX_TILT);
-        };
-        self.nodes.par_iter_mut().zip(&mut self.tilts).with_min_len(TASK).enumerate().for_each(adjust);
+            let last = starts[sheet + 1] - starts[sheet] - 1;
+            target.adjust_node(refined, potential, [sheet, index - starts[sheet], last], [charge, tilt]);
+        });
+    }
+}
+
+impl ChargeTarget {
+    /// Adjusts charge and tilt of a node of a sheet: `[sheet, node, last]` are the indices of the sheet, the node and the
+    /// sheet's last node.
+    fn adjust_node(
+        &self,
+        refined: &RefinedShape,
+        potential: &Grid2,
+        [sheet, node, last]: [usize; 3],
+        [charge, tilt]: [&mut f64; 2],
+    ) {
+        let Self { density, half_thickness, .. } = *self;
+        let (fraction, half_step) = (node as f64 / last as f64, 0.5 / last as f64);
+        let position = refined.position(sheet, fraction);
+        let found = potential.sample(position.to_array());
+        let change = if found < 0.0 { self.potential / found } else { CHANGE[1] };
+        *charge = (*charge * change.clamp(CHANGE[0], CHANGE[1])).clamp(CHARGE[0], CHARGE[1]);
+        let chord = refined.position(sheet, fraction + half_step) - refined.position(sheet, fraction - half_step);
+        let across = chord.perp().normalize_or_zero() * half_thickness;
+        let rise = potential.sample((position + across).to_array()) - potential.sample((position - across).to_array());
+        // A tilt a of the charge lowers one edge relative to the other by 2/3 a density L^2.
+        let change = 1.5 * rise / (density * *charge * half_thickness * half_thickness);
+        *tilt = (*tilt + change).clamp(-MAX_TILT, MAX_TILT);
     }
 }
 
@@ -147,19 +160,21 @@ pub(crate) fn scatter(
     update_index: u32,
 ) -> Vec<ScatteredParticle> {
     let segments = refined.segments();
-    let particle = |index: usize| {
-        let [u, v, ..] = key.words(index as u64, update_index, SCATTER).map(|word| f64::from(uniform(word)));
-        let sample = segments.sample((index as f64 + u) / count as f64)?;
-        let side = 2.0 * v - 1.0;
-        let position = sample.point + sample.tangent.perp() * (half_thickness * side);
-        let segment = [sample.segment.sheet, sample.segment.segment];
-        let scattered = ScatteredParticle {
-            position,
-            sheet: segment[0] as u32,
-            arc_fraction: sample.fraction as f32,
-            side: side as f32,
-        };
-        (refined.nearest_segment(position) == Some(segment)).then_some(scattered)
-    };
-    (0..count).into_par_iter().with_min_len(1024).filter_map(particle).collect()
+    let trials = (0..count).into_par_iter().with_min_len(1024);
+    trials
+        .filter_map(|index| {
+            let [u, v, ..] = key.words(index as u64, update_index, SCATTER).map(|word| f64::from(uniform(word)));
+            let sample = segments.sample((index as f64 + u) / count as f64)?;
+            let side = 2.0 * v - 1.0;
+            let position = sample.point + sample.tangent.perp() * (half_thickness * side);
+            let segment = [sample.segment.sheet, sample.segment.segment];
+            let scattered = ScatteredParticle {
+                position,
+                sheet: segment[0] as u32,
+                arc_fraction: sample.fraction as f32,
+                side: side as f32,
+            };
+            (refined.nearest_segment(position) == Some(segment)).then_some(scattered)
+        })
+        .collect()
 }

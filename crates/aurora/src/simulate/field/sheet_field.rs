@@ -147,21 +147,24 @@ impl FieldBuilder {
             .with_min_len(TASK)
             .filter_map(|particle| Some((counts.index(particle.position.to_array())?, charge.coordinate(particle))))
             .collect();
-        let source = |charge: &SheetCharge| {
-            let mut source = self.grid();
-            let cells = source.values_mut();
-            for (cell, position) in &coordinates {
-                cells[*cell] += unit * charge.charge(*position);
-            }
-            source
-        };
         // Sheets without attraction have no target potential.
         let is_conductor = self.parameters.field.charge == FieldCharge::Conductor;
         let adjustments = if density > 0.0 && is_conductor { ADJUSTMENTS } else { 0 };
         for _ in 0..adjustments {
-            charge.adjust_toward(refined, &self.solve_directly(source(&charge)), target);
+            let potential = self.solve_directly(self.sum_charge(&charge, &coordinates, unit));
+            charge.adjust_toward(refined, &potential, target);
         }
-        source(&charge)
+        self.sum_charge(&charge, &coordinates, unit)
+    }
+
+    /// Sums the charge of particles with these cells and coordinates along the sheets, in units of `unit`.
+    fn sum_charge(&self, charge: &SheetCharge, coordinates: &[(usize, SheetCoordinate)], unit: f64) -> Grid2 {
+        let mut source = self.grid();
+        let cells = source.values_mut();
+        for (cell, position) in coordinates {
+            cells[*cell] += unit * charge.charge(*position);
+        }
+        source
     }
 
     /// Field at the edge of a sheet, km/s^2.
@@ -184,20 +187,22 @@ impl FieldBuilder {
         potential
     }
 
-    /// Adds the noise of (x, z, t) and takes the gradient.
+    /// Potential with the noise of (x, z, t) and field (the negative gradient) of each cell, row by row, with a border that
+    /// repeats the outermost cells.
     fn sample_table(&self, potential: &Grid2, time: f64) -> Vec<[f32; 4]> {
         let mut noisy = potential.clone();
         self.add_noise(&mut noisy, time);
         let gradient = noisy.gradient();
         let [columns, rows] = noisy.size();
-        let value = |index: usize| {
-            let clamped = |position: usize, count: usize| position.clamp(1, count) - 1;
-            let (column, row) = (index % (columns + 2), index / (columns + 2));
-            let inner = clamped(row, rows) * columns + clamped(column, columns);
-            let [x, z] = gradient.values()[inner];
-            [noisy.values()[inner] as f32, -x as f32, -z as f32, 0.0]
-        };
-        (0..(columns + 2) * (rows + 2)).into_par_iter().with_min_len(TASK).map(value).collect()
+        let entries = (0..(columns + 2) * (rows + 2)).into_par_iter().with_min_len(TASK);
+        entries
+            .map(|index| {
+                let (column, row) = (index % (columns + 2), index / (columns + 2));
+                let inner = (row.clamp(1, rows) - 1) * columns + column.clamp(1, columns) - 1;
+                let [x, z] = gradient.values()[inner];
+                [noisy.values()[inner] as f32, -x as f32, -z as f32, 0.0]
+            })
+            .collect()
     }
 
     fn add_noise(&self, potential: &mut Grid2, time: f64) {
@@ -234,6 +239,7 @@ impl ElectricField {
         let (mut cells, mut fractions) = ([0; 2], [0.0; 2]);
         for axis in 0..2 {
             let position = coordinates[axis].fma(self.per_km, 0.5 - self.corner[axis]);
+            // Comparisons, so that NaN becomes 0. The table has a border of one cell: there is a cell after the last one of the grid.
             let clamped = if position > 0.0 { position } else { 0.0 };
             let max = self.size[axis] + 0.999;
             let clamped = if clamped < max { clamped } else { max };

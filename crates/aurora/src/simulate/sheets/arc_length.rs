@@ -43,15 +43,14 @@ pub(super) struct ArcPosition {
 impl ArcLengthMap {
     /// Initializes the coordinate with the arc length of each sheet.
     pub(crate) fn from_lengths(shape: &Shape, ids: &ControlPointIds) -> Self {
-        let sheet = |(index, sheet): (usize, &Sheet)| {
-            cumulative_lengths(&sheet.points)
-                .into_iter()
-                .map(|length| length + SHEET_OFFSET_KM * index as f64)
-                .collect()
-        };
         let points = points(shape);
+        let mut coordinates = Vec::with_capacity(points.len());
+        for (index, sheet) in points.iter().enumerate() {
+            let lengths = cumulative_lengths(sheet).into_iter();
+            coordinates.push(lengths.map(|length| length + SHEET_OFFSET_KM * index as f64).collect());
+        }
         Self {
-            coordinates: shape.sheets.iter().enumerate().map(sheet).collect(),
+            coordinates,
             reversed: points.iter().map(|points| vec![false; points.len()]).collect(),
             points,
             tracks: ids.sheets.to_vec(),
@@ -63,8 +62,8 @@ impl ArcLengthMap {
     #[cfg(test)]
     pub(crate) fn alone(shape: &Shape) -> Self {
         let mut numbers = 0..;
-        let number = |sheet: &Sheet| numbers.by_ref().take(sheet.points.len()).collect();
-        Self::from_lengths(shape, &ControlPointIds::alone(&shape.sheets.iter().map(number).collect::<Vec<_>>()))
+        let sheets = shape.sheets.iter().map(|sheet| numbers.by_ref().take(sheet.points.len()).collect());
+        Self::from_lengths(shape, &ControlPointIds::alone(&sheets.collect::<Vec<_>>()))
     }
 
     /// Transfers the coordinate to `shape`, whose control points are `ids`: existing points keep theirs, in whichever
@@ -145,8 +144,8 @@ impl<'a> PreviousArcMap<'a> {
             }
         }
         slots.sort_unstable();
-        let sheet = |points: &Vec<DVec2>| Sheet { points: points.clone(), ..Sheet::default() };
-        let shape = Shape { sheets: map.points.iter().map(sheet).collect() };
+        let sheets = map.points.iter().map(|points| Sheet { points: points.clone(), ..Sheet::default() });
+        let shape = Shape { sheets: sheets.collect() };
         Self { map, slots, starts, near: NearestSegmentGrid::new(&shape, REACH_KM) }
     }
 
@@ -195,21 +194,28 @@ impl<'a> PreviousArcMap<'a> {
     /// order. New points take the direction of their neighbors, and a sheet of new points that of the nearest previous
     /// sheet.
     fn reversed(&self, known: &[Option<[usize; 2]>], points: &[DVec2]) -> Vec<bool> {
+        // First and last slot by previous sheet, in the new order.
         let mut ends: BTreeMap<usize, [usize; 2]> = BTreeMap::new();
         for [sheet, slot] in known.iter().flatten() {
             ends.entry(*sheet).or_insert([*slot; 2])[1] = *slot;
         }
-        let reversed = |[sheet, slot]: &[usize; 2]| {
-            let now = ends.get(sheet).is_some_and(|[first, last]| first > last);
-            self.map.reversed[*sheet][*slot] != now
-        };
-        let mut last = known.iter().flatten().next().map_or_else(|| self.reversed_by_position(points), reversed);
-        let mut all = Vec::with_capacity(known.len());
+        let mut all: Vec<Option<bool>> = Vec::with_capacity(known.len());
         for slot in known {
-            last = slot.as_ref().map_or(last, reversed);
-            all.push(last);
+            let reversed = slot.map(|[sheet, slot]| {
+                let is_opposite = ends.get(&sheet).is_some_and(|[first, last]| first > last);
+                self.map.reversed[sheet][slot] != is_opposite
+            });
+            all.push(reversed);
         }
-        all
+        // New points before the first known one take its direction, others that of the known one before them.
+        let first = all.iter().flatten().next().copied();
+        let mut last = first.unwrap_or_else(|| self.reversed_by_position(points));
+        all.into_iter()
+            .map(|reversed| {
+                last = reversed.unwrap_or(last);
+                last
+            })
+            .collect()
     }
 
     /// Whether the middle of a sheet of new control points runs against the nearest previous sheet.
@@ -276,8 +282,7 @@ fn run_end(coordinates: &[f64], cumulative_lengths: &[f64], reversed: &[bool], s
 /// Relaxes a run toward arc length about its mean; a degenerate run takes the direction of `reversed`.
 fn relax_run(coordinates: &mut [f64], cumulative_lengths: &[f64], reversed: bool, fraction: f64) {
     let count = coordinates.len() as f64;
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
-    let (middle, middle_length) = (mean(coordinates), mean(cumulative_lengths));
+    let [middle, middle_length] = [&*coordinates, cumulative_lengths].map(|values| values.iter().sum::<f64>() / count);
     let [first, last] = [coordinates.first(), coordinates.last()];
     let forward = if first == last { !reversed } else { first < last };
     for (coordinate, length) in coordinates.iter_mut().zip(cumulative_lengths) {

@@ -69,16 +69,18 @@ pub(crate) struct PatternSample {
 impl RayPattern {
     pub(crate) fn new(parameters: &AuroraParameters, key: Key) -> Self {
         let [a, b, c, d] = key.words(0, 0, Purpose::named("aurora rays"));
-        let noise = |seed, fractal| Noise::new(seed, fractal, [0; 2]).expect("few octaves without a period are noise");
-        let amplitude = |amplitude: &f64| Some(amplitude * f64::from(RAYS.gain));
-        let amplitudes = || std::iter::successors(Some(1.0), amplitude).take(RAYS.octaves as usize);
-        let (sum, squares): (f64, f64) = (amplitudes().sum(), amplitudes().map(|a| a * a).sum());
+        let [mut sum, mut squares, mut amplitude] = [0.0, 0.0, 1.0_f64];
+        for _ in 0..RAYS.octaves {
+            sum += amplitude;
+            squares += amplitude * amplitude;
+            amplitude *= f64::from(RAYS.gain);
+        }
         Self {
             rays: parameters.rays.clone(),
             pulsation: parameters.pulsation.clone(),
-            noise: [noise(a, RAYS), noise(b, RAYS)],
-            black: noise(c, Fractal::SINGLE),
-            patches: noise(d, Fractal::SINGLE),
+            noise: [pattern_noise(a, RAYS), pattern_noise(b, RAYS)],
+            black: pattern_noise(c, Fractal::SINGLE),
+            patches: pattern_noise(d, Fractal::SINGLE),
             deviation: ((VARIANCE[0] * squares).sqrt() / sum) as f32,
             max_nodes: NODES_PER_PARTICLE * parameters.particles.count as f64,
         }
@@ -94,7 +96,8 @@ impl RayPattern {
     ) -> RayTable {
         let level = bansho_base::math::simd::level();
         let node = self.node_km().max(lengths.iter().sum::<f64>() / self.max_nodes);
-        let sheet = |(sheet, length): (usize, &f64)| {
+        let mut sheets = Vec::with_capacity(lengths.len());
+        for (sheet, length) in lengths.iter().enumerate() {
             let last = (length / node).max(1.0).ceil();
             let coordinates = arc_coordinates(sheet, last as usize);
             let mut nodes = Vec::with_capacity(coordinates.len().next_multiple_of(LANES));
@@ -104,18 +107,23 @@ impl RayPattern {
                 nodes.extend((0..coordinates.len()).map(|lane| noises.map(|values| values[lane])));
             }
             fade(&mut nodes, &coordinates, length / last, self.rays.spacing_km);
-            nodes
-        };
-        RayTable { sheets: lengths.iter().enumerate().map(sheet).collect() }
+            sheets.push(nodes);
+        }
+        RayTable { sheets }
     }
 
     /// Node spacing for the finest requested pattern.
     fn node_km(&self) -> f64 {
-        let finest = |strength: f64, scale: f64| if strength > 0.0 { scale } else { f64::INFINITY };
-        let rays = finest(self.rays.contrast.max(self.rays.energy_variation), self.rays.spacing_km);
-        let others = finest(self.rays.black_ray_depth, self.rays.black_ray_spacing_km)
-            .min(finest(self.pulsation.modulation_depth, self.pulsation.patch_length_km));
-        rays.min(others) / NODES_PER_CELL
+        let patterns = [
+            (self.rays.contrast.max(self.rays.energy_variation), self.rays.spacing_km),
+            (self.rays.black_ray_depth, self.rays.black_ray_spacing_km),
+            (self.pulsation.modulation_depth, self.pulsation.patch_length_km),
+        ];
+        let mut finest_km = f64::INFINITY;
+        for (_, scale_km) in patterns.into_iter().filter(|(strength, _)| *strength > 0.0) {
+            finest_km = finest_km.min(scale_km);
+        }
+        finest_km / NODES_PER_CELL
     }
 
     /// The pattern at sixteen positions.
@@ -175,6 +183,11 @@ impl RayPattern {
         let dark = 0.5 - 0.5 * approximations::cos_turns(turns + 2.0 * noise);
         1.0 - self.pulsation.modulation_depth as f32 * dark
     }
+}
+
+/// Noise of a pattern along the sheets and in time.
+fn pattern_noise(seed: u32, fractal: Fractal) -> Noise<2> {
+    Noise::new(seed, fractal, [0; 2]).expect("few octaves without a period are noise")
 }
 
 /// Fades the rays near nodes where the coordinate is stretched or discontinuous, over `scale` km on both sides; nodes

@@ -8,7 +8,7 @@ use bansho_base::{
 use super::arc_length::{ArcLengthMap, ArcPosition};
 use crate::{
     AuroraParameters, FoldParameters,
-    shapes::{Bridge, NearestSegmentGrid, Shape, Sheet, SheetEnd, SheetSampler, cumulative_lengths},
+    shapes::{Bridge, NearestSegmentGrid, Shape, Sheet, SheetEnd, SheetSampler, cumulative_lengths, line_length},
 };
 
 /// Segments per fold, unless there would be too many.
@@ -155,8 +155,7 @@ impl RefinedShape {
 
     /// Length of each sheet, km.
     pub(crate) fn sheet_lengths(&self) -> Vec<f64> {
-        let length = |points: &[DVec2]| points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-        self.shape.sheets.iter().map(|sheet| length(&sheet.points)).collect()
+        self.shape.sheets.iter().map(|sheet| line_length(&sheet.points)).collect()
     }
 
     /// The position at a fraction of a sheet's length, km.
@@ -169,19 +168,17 @@ impl RefinedShape {
     /// Coordinates at `last + 1` equally spaced fractions of a sheet's length, km.
     pub(crate) fn arc_coordinates(&self, sheet: usize, last: usize) -> Vec<f64> {
         let (arc_coordinates, fractions) = (&self.arc_coordinates[sheet], &self.fractions[sheet]);
+        let mut coordinates = Vec::with_capacity(last + 1);
         let mut after = 1;
-        let at = |node: usize| {
+        for node in 0..=last {
             let fraction = node as f64 / last as f64;
             while after + 1 < fractions.len() && fractions[after] <= fraction {
                 after += 1;
             }
-            lerp(
-                arc_coordinates[after - 1],
-                arc_coordinates[after],
-                fraction_between([fractions[after - 1], fractions[after]], fraction),
-            )
-        };
-        (0..=last).map(at).collect()
+            let t = fraction_between([fractions[after - 1], fractions[after]], fraction);
+            coordinates.push(lerp(arc_coordinates[after - 1], arc_coordinates[after], t));
+        }
+        coordinates
     }
 
     /// Point before a fraction of a sheet's length, and the interpolation fraction.
@@ -200,8 +197,9 @@ impl RefinedShape {
             let count = ((fractions[index + 1] - fractions[index]) / max_fraction(number)).ceil().max(1.0);
             (0..count as usize).map(move |t| {
                 let middle = (t as f64 + 0.5) / count;
-                let at = |values: &[f64]| lerp(values[index], values[index + 1], middle);
-                SheetPiece { sheet: number, fraction: at(fractions), flux: at(&sheet.flux), length_km: length / count }
+                let [fraction, flux] =
+                    [fractions, &sheet.flux].map(|values| lerp(values[index], values[index + 1], middle));
+                SheetPiece { sheet: number, fraction, flux, length_km: length / count }
             })
         })
     }
@@ -221,12 +219,13 @@ impl RefinedShape {
     pub(crate) fn project(&self, point: DVec2) -> Option<SheetProjection> {
         let nearest = self.near.nearest_point(point)?;
         let attributes = &self.attributes[nearest.segment];
-        let at = |[start, change]: [f64; 2]| start + nearest.fraction * change;
+        let [fraction, flux, energy] = [attributes.fraction, attributes.flux, attributes.energy]
+            .map(|[start, change]| start + nearest.fraction * change);
         Some(SheetProjection {
             sheet: attributes.sheet,
-            fraction: at(attributes.fraction),
-            flux: at(attributes.flux),
-            energy: at(attributes.energy),
+            fraction,
+            flux,
+            energy,
             side: nearest.cross * attributes.per_length,
         })
     }
@@ -241,12 +240,13 @@ impl SegmentAttributes {
     ) -> Self {
         let (number, index) = (sheet as usize, index as usize);
         let sheet_points = &shape.sheets[number];
-        let along = |values: &[f64]| [values[index], values[index + 1] - values[index]];
+        let [fraction, flux, energy] = [&fractions[number], &sheet_points.flux, &sheet_points.energy]
+            .map(|values| [values[index], values[index + 1] - values[index]]);
         let length = sheet_points.points[index].distance(sheet_points.points[index + 1]);
         Self {
-            fraction: along(&fractions[number]),
-            flux: along(&sheet_points.flux),
-            energy: along(&sheet_points.energy),
+            fraction,
+            flux,
+            energy,
             per_length: if length > 0.0 { arc_positions[number][index].direction / length } else { 0.0 },
             sheet,
         }
@@ -270,12 +270,6 @@ fn refine(sheet: &Sheet, piece_km: f64, arc_position: impl Fn(usize, f64) -> Arc
     let points = without_swapped_points(&sheet.points, NEAR_PIECES * piece_km);
     let headings = headings(&points);
     let (mut fine, mut arc_positions) = (Sheet::default(), Vec::new());
-    let mut push = |point: DVec2, index: usize, t: f64| {
-        fine.points.push(point);
-        fine.flux.push(lerp(sheet.flux[index], sheet.flux[index + 1], t));
-        fine.energy.push(lerp(sheet.energy[index], sheet.energy[index + 1], t));
-        arc_positions.push(arc_position(index, t));
-    };
     for (index, pair) in points.windows(2).enumerate() {
         let displacement = pair[1] - pair[0];
         let length = displacement.length();
@@ -284,13 +278,23 @@ fn refine(sheet: &Sheet, piece_km: f64, arc_position: impl Fn(usize, f64) -> Arc
         let pieces = (length / piece_km).ceil().max(1.0) as usize;
         for number in 0..pieces {
             let t = number as f64 / pieces as f64;
-            push(hermite([pair[0], pair[1]], tangents, t), index, t);
+            fine.points.push(hermite([pair[0], pair[1]], tangents, t));
+            push_factors(&mut fine, sheet, index, t);
+            arc_positions.push(arc_position(index, t));
         }
     }
     if let Some(last) = points.len().checked_sub(2) {
-        push(points[last + 1], last, 1.0);
+        fine.points.push(points[last + 1]);
+        push_factors(&mut fine, sheet, last, 1.0);
+        arc_positions.push(arc_position(last, 1.0));
     }
     (fine, arc_positions)
+}
+
+/// Appends flux and energy of `sheet` at the fraction `t` between point `index` and the next to those of `fine`.
+fn push_factors(fine: &mut Sheet, sheet: &Sheet, index: usize, t: f64) {
+    fine.flux.push(lerp(sheet.flux[index], sheet.flux[index + 1], t));
+    fine.energy.push(lerp(sheet.energy[index], sheet.energy[index + 1], t));
 }
 
 /// A bridge as a sheet between two ends; the coordinate continues that of the first.
@@ -300,10 +304,11 @@ fn bridge_sheet(
     arc_positions: &[Vec<ArcPosition>],
     piece_km: f64,
 ) -> (Sheet, Vec<ArcPosition>) {
-    let point = |end: SheetEnd| if end.is_end { fine.sheets[end.sheet].points.len() - 1 } else { 0 };
-    let [from, to] = bridge.ends.map(|end| fine.sheets[end.sheet].points[point(end)]);
+    let points =
+        bridge.ends.map(|SheetEnd { sheet, is_end }| if is_end { fine.sheets[sheet].points.len() - 1 } else { 0 });
+    let [from, to] = [0, 1].map(|side| fine.sheets[bridge.ends[side].sheet].points[points[side]]);
     let first_end = bridge.ends[0];
-    let start = arc_positions[first_end.sheet][point(first_end)];
+    let start = arc_positions[first_end.sheet][points[0]];
     let direction = if first_end.is_end { start.direction } else { -start.direction };
     let length = from.distance(to);
     let pieces = (length / piece_km).ceil().max(1.0) as usize;
@@ -337,17 +342,18 @@ fn without_swapped_points(points: &[DVec2], near_km: f64) -> Vec<DVec2> {
 
 /// Tangent direction at each point: that of the circle through it and its neighbors.
 fn headings(points: &[DVec2]) -> Vec<DVec2> {
-    let weighted = |from: usize| {
-        let displacement = points[from + 1] - points[from];
-        displacement / displacement.length_squared().max(1e-12)
-    };
-    let last = points.len() - 1;
-    let heading = |index: usize| {
-        let before = if index > 0 { weighted(index - 1) } else { DVec2::ZERO };
-        let after = if index < last { weighted(index) } else { DVec2::ZERO };
-        (before + after).normalize_or_zero()
-    };
-    (0..points.len()).map(heading).collect()
+    let mut headings = Vec::with_capacity(points.len());
+    let mut before = DVec2::ZERO;
+    for (index, point) in points.iter().enumerate() {
+        // The tangent of the circle is the sum of the displacements, each divided by its squared length.
+        let after = points.get(index + 1).map_or(DVec2::ZERO, |next| {
+            let displacement = *next - *point;
+            displacement / displacement.length_squared().max(1e-12)
+        });
+        headings.push((before + after).normalize_or_zero());
+        before = after;
+    }
+    headings
 }
 
 /// Removes the backward component of a tangent, which would make the curve pass there three times.
