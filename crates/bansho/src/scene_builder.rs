@@ -95,8 +95,11 @@ impl SceneBuilder {
         let mut stated = Table::default();
         stated.push("name", Value::Text(name.to_owned()));
         let defaults = P::default().to_table();
-        let differs = |entry: &Entry| defaults.get(&entry.key).is_none_or(|default| default.value != entry.node.value);
-        stated.entries.extend(parameters.to_table().entries.into_iter().filter(differs));
+        for entry in parameters.to_table().entries {
+            if defaults.get(&entry.key).is_none_or(|default| default.value != entry.node.value) {
+                stated.entries.push(entry);
+            }
+        }
         self.item(parameters.kind().key, stated)
     }
 

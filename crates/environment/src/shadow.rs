@@ -53,12 +53,12 @@ fn misses_bounds(caster: &Occluder, point: DVec3, toward: DVec3, distance: f64, 
 pub(crate) fn sky_visibility(casters: &[Occluder], point: DVec3) -> f64 {
     let mut visible = 1.0;
     for caster in casters {
-        let is_far = |(center, radius): (DVec3, f64)| {
+        if let Some((center, radius)) = caster.bounding_sphere() {
+            // From so far away, each sample is nearer to the ground than to the solid, which therefore hides nothing.
             let reach = radius + 2.0 * SKY_SAMPLES[SKY_SAMPLES.len() - 1][0];
-            (center - point).length_squared() > reach * reach
-        };
-        if caster.bounding_sphere().is_some_and(is_far) {
-            continue;
+            if (center - point).length_squared() > reach * reach {
+                continue;
+            }
         }
         let hidden = SKY_SAMPLES.map(|[height, weight]| {
             let near = caster.signed_distance(point + DVec3::Y * height).max(0.0);

@@ -90,14 +90,12 @@ impl CompiledScene {
         let previous = previous.filter(|previous| Arc::ptr_eq(&previous.assets, &assets));
         let frame = scene.picture.first_frame;
         let view = scene.plate_view(frame);
-        let same_view = |previous: &Scene| !scene.plate.fits_ground() || previous.plate_view(frame) == view;
-        let same_plate = |previous: &Self| {
-            let before = &previous.scene;
-            before.plate == scene.plate && before.picture.first_frame == frame && same_view(before)
-        };
-        if !previous.is_some_and(same_plate)
-            && let Err(error) = scene.plate.read_frame(assets.as_ref(), frame, &view)
-        {
+        let is_plate_known = previous.is_some_and(|Self { scene: before, .. }| {
+            let is_same_plate = before.plate == scene.plate && before.picture.first_frame == frame;
+            // A depth that is fitted to the ground depends on the camera too.
+            is_same_plate && (!scene.plate.fits_ground() || before.plate_view(frame) == view)
+        });
+        if !is_plate_known && let Err(error) = scene.plate.read_frame(assets.as_ref(), frame, &view) {
             errors.push(("plate".to_owned(), error));
         }
         let shared = build_shared(&scene, assets.as_ref(), previous, &mut errors);
@@ -123,12 +121,12 @@ impl CompiledScene {
     pub(crate) fn plate_boxes(&self, view: View) -> Option<Arc<PlateBoxes>> {
         let (picture, plate) = (self.plate_image()?, &self.scene.plate);
         let alpha = plate.alpha_of(&picture);
-        let compute = || PlateBoxes::new(&picture, alpha, &view);
         let path = plate.image.as_ref()?;
-        Some(match self.assets.digest(&path.0, self.scene.picture.first_frame) {
-            Ok(digest) => self.plate_boxes.get_or_compute(PlateBoxesKey { digest, alpha, view }, compute),
-            Err(_) => Arc::new(compute()),
-        })
+        let Ok(digest) = self.assets.digest(&path.0, self.scene.picture.first_frame) else {
+            return Some(Arc::new(PlateBoxes::new(&picture, alpha, &view)));
+        };
+        let key = PlateBoxesKey { digest, alpha, view };
+        Some(self.plate_boxes.get_or_compute(key, || PlateBoxes::new(&picture, alpha, &view)))
     }
 
     /// Whether the plate covers the picture: it has one, whose image is opaque in the first frame.
@@ -145,11 +143,13 @@ impl CompiledScene {
     pub fn with_instance(&self, index: usize, instance: Instance, revision: u64) -> Result<Self, BuildErrors> {
         let mut scene = Scene::clone(&self.scene);
         let others = scene.instances.iter().enumerate().filter(|(other, each)| *other != index && each.enabled);
-        let budget = others.map(|(_, each)| each).chain(Some(&instance).filter(|own| own.enabled));
-        let error = |error| BuildErrors(vec![(instance.name.clone(), error)]);
-        budget.clone().try_fold(0, |total, each| each.parameters.check_particle_budget(total)).map_err(error)?;
+        let mut counted = others.map(|(_, each)| each).chain(Some(&instance).filter(|own| own.enabled));
         let before = self.phenomenon(&instance.name);
-        let phenomenon = build_instance(&instance, &self.scene, self.assets.as_ref(), before).map_err(error)?;
+        // Memory is estimated before anything is built.
+        let phenomenon = counted
+            .try_fold(0, |total, each| each.parameters.check_particle_budget(total))
+            .and_then(|_| build_instance(&instance, &self.scene, self.assets.as_ref(), before))
+            .map_err(|error| BuildErrors(vec![(instance.name.clone(), error)]))?;
         let fingerprint = fingerprint::of_revision(&instance.name, revision);
         let built = BuiltPhenomenon { fingerprint, phenomenon };
         let mut enabled = self.enabled.clone();
@@ -211,8 +211,9 @@ impl CompiledScene {
 
     /// The same scene without some of its phenomena.
     pub(crate) fn without(&self, names: &[&str]) -> Self {
-        let is_kept = |built: &&BuiltPhenomenon| !names.contains(&built.phenomenon.info().name);
-        Self { enabled: self.enabled.iter().filter(is_kept).cloned().collect(), ..self.clone() }
+        let mut remaining = self.clone();
+        remaining.enabled.retain(|built| !names.contains(&built.phenomenon.info().name));
+        remaining
     }
 
     /// Runs of all enabled phenomena in their initial states. In a loop, stepped phenomena get a [`CrossfadeRun`].
@@ -234,15 +235,15 @@ pub(crate) struct ActiveRun {
 impl ActiveRun {
     pub(crate) fn start(built: &BuiltPhenomenon, loop_s: Option<f64>) -> Self {
         let phenomenon = &built.phenomenon;
-        let start = || phenomenon.clone().start();
         let stepping = phenomenon.info().stepping;
         let (run, stepping): (Box<dyn Run>, _) = match (loop_s, stepping) {
             (Some(loop_s), Some(stepping)) => {
-                let crossfade = CrossfadeRun::new(loop_s, stepping, phenomenon.info().aovs, [start(), start()]);
+                let runs = [phenomenon.clone().start(), phenomenon.clone().start()];
+                let crossfade = CrossfadeRun::new(loop_s, stepping, phenomenon.info().aovs, runs);
                 let stepping = crossfade.stepping();
                 (Box::new(crossfade), Some(stepping))
             }
-            _ => (start(), stepping),
+            _ => (phenomenon.clone().start(), stepping),
         };
         Self { built: built.clone(), run, stepping, steps_taken: 0 }
     }
@@ -272,26 +273,38 @@ fn build_shared(
 ) -> Vec<BuiltShared> {
     let mut shared = Vec::new();
     for (path, instance) in scene.tables.with_paths() {
-        // Fingerprinting reads every file that a mesh names, whatever their total size, whereas building refuses too many bytes. So only
-        // what has been built, now or in `previous`, is fingerprinted.
-        let fingerprint = || fingerprint::of_shared(instance, scene, assets);
-        let is_equal = |known: &&BuiltShared| known.instance.parameters.equals(instance.parameters.as_ref());
-        let candidate = previous.and_then(|previous| previous.shared.iter().find(is_equal));
-        let known = candidate.and_then(|_| {
-            let fingerprint = fingerprint();
-            previous?.shared.iter().find(|known| known.fingerprint == fingerprint).cloned()
-        });
-        let build = || {
-            let object = instance.parameters.build(assets)?;
-            let table = BuiltTable { parameters: instance.parameters.clone(), object };
-            Ok(BuiltShared { fingerprint: fingerprint(), instance: instance.clone(), table })
-        };
-        match known.map_or_else(build, Ok) {
+        let known = previous.and_then(|previous| known_shared(instance, scene, assets, previous));
+        match known.map_or_else(|| new_shared(instance, scene, assets), Ok) {
             Ok(built) => shared.push(built),
             Err(error) => errors.push((path, error)),
         }
     }
     shared
+}
+
+/// What `previous` has built from an equal table and equal files.
+///
+/// Fingerprinting reads every file that a mesh names, whatever their total size, whereas building refuses too many bytes. So only what has been
+/// built, now or in `previous`, is fingerprinted.
+fn known_shared(
+    instance: &SharedInstance,
+    scene: &Scene,
+    assets: &dyn Assets,
+    previous: &CompiledScene,
+) -> Option<BuiltShared> {
+    let mut built = previous.shared.iter();
+    if !built.any(|built| built.instance.parameters.equals(instance.parameters.as_ref())) {
+        return None;
+    }
+    let fingerprint = fingerprint::of_shared(instance, scene, assets);
+    previous.shared.iter().find(|built| built.fingerprint == fingerprint).cloned()
+}
+
+fn new_shared(instance: &SharedInstance, scene: &Scene, assets: &dyn Assets) -> Result<BuiltShared, BuildError> {
+    let object = instance.parameters.build(assets)?;
+    let table = BuiltTable { parameters: instance.parameters.clone(), object };
+    let fingerprint = fingerprint::of_shared(instance, scene, assets);
+    Ok(BuiltShared { fingerprint, instance: instance.clone(), table })
 }
 
 /// Every phenomenon by its fingerprint, and the fingerprints of the enabled ones in the order of the scene.
@@ -318,20 +331,26 @@ fn build_instances(
                 }
             }
         }
-        let fingerprint = || fingerprint::of_instance(instance, scene, assets);
         let known = previous.and_then(|previous| {
-            let fingerprint = fingerprint();
+            let fingerprint = fingerprint::of_instance(instance, scene, assets);
             previous.built.get(&fingerprint).map(|phenomenon| (fingerprint, phenomenon.clone()))
         });
-        let before = previous.and_then(|previous| previous.phenomenon(&instance.name));
-        let build = || build_instance(instance, scene, assets, before).map(|phenomenon| (fingerprint(), phenomenon));
-        match known.map_or_else(build, Ok) {
-            Ok((fingerprint, phenomenon)) => {
-                built.insert(fingerprint, phenomenon);
-                enabled.extend(instance.enabled.then_some(fingerprint));
+        let (fingerprint, phenomenon) = match known {
+            Some(known) => known,
+            None => {
+                let before = previous.and_then(|previous| previous.phenomenon(&instance.name));
+                match build_instance(instance, scene, assets, before) {
+                    // After it was built: building refuses too many bytes, which a fingerprint would read.
+                    Ok(phenomenon) => (fingerprint::of_instance(instance, scene, assets), phenomenon),
+                    Err(error) => {
+                        errors.push((path, error));
+                        continue;
+                    }
+                }
             }
-            Err(error) => errors.push((path, error)),
-        }
+        };
+        built.insert(fingerprint, phenomenon);
+        enabled.extend(instance.enabled.then_some(fingerprint));
     }
     (built, enabled)
 }

@@ -304,11 +304,13 @@ impl Prepared for PreparedCrossfade<'_> {
     }
 
     fn metadata(&self) -> Vec<MetadataEntry> {
-        let mix = |(current, adjacent): (MetadataEntry, MetadataEntry)| {
-            let value = f64::from(self.current_weight).mul_add(current.value - adjacent.value, adjacent.value);
-            MetadataEntry { value, ..current }
-        };
-        self.current.metadata().into_iter().zip(self.adjacent.metadata()).map(mix).collect()
+        let mut entries = self.current.metadata();
+        let adjacent_entries = self.adjacent.metadata();
+        entries.truncate(adjacent_entries.len());
+        for (entry, adjacent) in entries.iter_mut().zip(adjacent_entries) {
+            entry.value = f64::from(self.current_weight).mul_add(entry.value - adjacent.value, adjacent.value);
+        }
+        entries
     }
 
     fn may_refract(&self) -> bool {

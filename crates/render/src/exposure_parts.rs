@@ -81,11 +81,14 @@ fn is_enough(count: usize, wanted: usize) -> bool {
 /// Numbers of parts near to the wanted ones, of which the largest is at least `total`: halves, quarters or eighths of the same number.
 fn nested(wanted: &[usize], total: usize) -> Vec<usize> {
     const MAX_HALVINGS: u32 = 3;
-    let halvings = |wanted: usize| (0..=MAX_HALVINGS).rev().find(|halvings| is_enough(total >> halvings, wanted));
-    let each: Vec<u32> = wanted.iter().map(|wanted| halvings(*wanted).unwrap_or(0)).collect();
+    let mut halvings = Vec::with_capacity(wanted.len());
+    for &wanted in wanted {
+        let most = (0..=MAX_HALVINGS).rev().find(|halvings| is_enough(total >> halvings, wanted));
+        halvings.push(most.unwrap_or(0));
+    }
     // MAX_PARTS is a multiple of every unit, so it remains the limit.
-    let total = total.next_multiple_of(1 << each.iter().copied().max().unwrap_or(0));
-    each.into_iter().map(|halvings| total >> halvings).collect()
+    let total = total.next_multiple_of(1 << halvings.iter().copied().max().unwrap_or(0));
+    halvings.into_iter().map(|halvings| total >> halvings).collect()
 }
 
 /// The parts of an exposure in which a phenomenon is drawn, and how.
@@ -106,12 +109,13 @@ impl<'a> ExposureParts<'a> {
         if count <= 1 {
             return Self::default();
         }
-        let part = |index| {
+        let mut parts = Vec::with_capacity(count);
+        for index in 0..count {
             let view = view.part(index, count);
             let surroundings = surroundings_of_part(&view);
-            ExposurePart { surroundings, view: if blurs_itself { view.at_middle() } else { view } }
-        };
-        Self { parts: (0..count).map(part).collect(), blurs_itself }
+            parts.push(ExposurePart { surroundings, view: if blurs_itself { view.at_middle() } else { view } });
+        }
+        Self { parts, blurs_itself }
     }
 
     /// The depth intervals of a phenomenon during the exposure of a view.
@@ -139,11 +143,10 @@ pub(crate) struct PreparedExposure<'a> {
 /// The depth intervals of a phenomenon in all parts of an exposure: each grows to hold its motion.
 fn depth_intervals(run: &dyn Run, parts: &[ExposurePart]) -> Vec<DepthInterval> {
     let each: Vec<_> = parts.iter().map(|part| run.depth_intervals(&part.view, &part.surroundings)).collect();
-    let hull = |a: &mut DepthInterval, b: &DepthInterval| (a.near, a.far) = (a.near.min(b.near), a.far.max(b.far));
     let mut intervals = each.first().cloned().unwrap_or_default();
     if each.iter().all(|others| others.len() == intervals.len()) {
         for others in &each {
-            intervals.iter_mut().zip(others).for_each(|(interval, other)| hull(interval, other));
+            intervals.iter_mut().zip(others).for_each(|(interval, other)| extend(interval, other));
         }
         return intervals;
     }
@@ -153,11 +156,17 @@ fn depth_intervals(run: &dyn Run, parts: &[ExposurePart]) -> Vec<DepthInterval> 
     all.dedup_by(|next, previous| {
         let touches = next.near <= previous.far;
         if touches {
-            hull(previous, next);
+            extend(previous, next);
         }
         touches
     });
     all
+}
+
+/// Extends an interval so that it holds another one.
+fn extend(interval: &mut DepthInterval, other: &DepthInterval) {
+    interval.near = interval.near.min(other.near);
+    interval.far = interval.far.max(other.far);
 }
 
 /// Prepares a phenomenon for the exposure of a view.

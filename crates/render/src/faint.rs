@@ -2,7 +2,7 @@
 
 use std::{collections::HashSet, sync::Arc};
 
-use bansho_base::phenomenon::{Phenomenon, Remark};
+use bansho_base::phenomenon::{PhenomenonInfo, Remark};
 
 use crate::{
     compiled::CompiledScene,
@@ -28,8 +28,8 @@ pub(crate) fn faint_phenomenon_remarks(compiled: &CompiledScene, plan: &Plan) ->
     if !plan.scene.has_plate() {
         return Vec::new();
     }
-    let infos = || compiled.phenomena().map(|phenomenon| phenomenon.info());
-    let stepped: Vec<&str> = infos().filter(|info| info.stepping.is_some()).map(|info| info.name).collect();
+    let infos = compiled.phenomena().map(|phenomenon| phenomenon.info());
+    let stepped: Vec<&str> = infos.filter(|info| info.stepping.is_some()).map(|info| info.name).collect();
     let enabled: HashSet<&str> = plan
         .scene
         .instances
@@ -38,19 +38,25 @@ pub(crate) fn faint_phenomenon_remarks(compiled: &CompiledScene, plan: &Plan) ->
         .map(|instance| instance.name.as_str())
         .collect();
     let closed_forms = Arc::new(compiled.without(&stepped));
-    let remark = |phenomenon: &&Arc<dyn Phenomenon>| {
-        let info = phenomenon.info();
+    let measured = closed_forms.phenomena().map(|phenomenon| phenomenon.info());
+    let measured: Vec<PhenomenonInfo> = measured.filter(|info| enabled.contains(info.name)).collect();
+    if measured.len() > MAX_MEASURED {
+        return Vec::new();
+    }
+    let mut remarks = Vec::new();
+    for info in measured {
         // What cannot be drawn is reported when it is drawn for output.
-        let change = greatest_change(&closed_forms, plan, info.name).ok()?;
-        let message = format!(
-            "it changes the picture by {:.1} %, which is hardly seen; to show it, {}, or lower `exposure_ev100` in [plate]",
-            100.0 * change.mean,
-            info.strengthened_by
-        );
-        change.is_faint().then(|| (info.name.to_owned(), Remark::new(message)))
-    };
-    let measured: Vec<_> = closed_forms.phenomena().filter(|each| enabled.contains(each.info().name)).collect();
-    if measured.len() > MAX_MEASURED { Vec::new() } else { measured.iter().filter_map(remark).collect() }
+        let Ok(change) = greatest_change(&closed_forms, plan, info.name) else { continue };
+        if change.is_faint() {
+            let message = format!(
+                "it changes the picture by {:.1} %, which is hardly seen; to show it, {}, or lower `exposure_ev100` in [plate]",
+                100.0 * change.mean,
+                info.strengthened_by
+            );
+            remarks.push((info.name.to_owned(), Remark::new(message)));
+        }
+    }
+    remarks
 }
 
 /// How much a picture differs from the one without a phenomenon.

@@ -3,6 +3,8 @@
 //! That of a frame is [`Plan::frame_fingerprint`](crate::Plan::frame_fingerprint), that of a simulation's state
 //! [`CompiledScene::state_fingerprint`](crate::CompiledScene::state_fingerprint).
 
+use std::fmt::Display;
+
 use bansho_base::{
     color::{AlphaConvention, BitDepth},
     host::assets::Assets,
@@ -18,11 +20,19 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The fingerprint of a PNG of a frame: that of the frame's pixels, combined with how they are stored where that is not the default.
 pub fn of_png(frame: Fingerprint, bits: BitDepth, alpha: AlphaConvention) -> Fingerprint {
-    let stored = |fingerprint: Fingerprint, how: &[u8]| {
-        *blake3::Hasher::new().update(&fingerprint).update(how).finalize().as_bytes()
-    };
-    let frame = if bits == BitDepth::Sixteen { stored(frame, b"16 bits") } else { frame };
-    if alpha == AlphaConvention::Encoded { stored(frame, b"encoded alpha") } else { frame }
+    let mut fingerprint = frame;
+    if bits == BitDepth::Sixteen {
+        fingerprint = combined(fingerprint, b"16 bits");
+    }
+    if alpha == AlphaConvention::Encoded {
+        fingerprint = combined(fingerprint, b"encoded alpha");
+    }
+    fingerprint
+}
+
+/// The fingerprint of something with one more property.
+fn combined(fingerprint: Fingerprint, property: &[u8]) -> Fingerprint {
+    *blake3::Hasher::new().update(&fingerprint).update(property).finalize().as_bytes()
 }
 
 /// A hasher of the seed and the length of the loop.
@@ -76,16 +86,25 @@ pub(crate) fn hash_state(scene: &Scene, assets: &dyn Assets, hasher: &mut blake3
     for table in &shared {
         hash_table(table.kind.key, table.parameters.canonical(), hasher);
     }
-    let enabled = || scene.instances.iter().filter(|instance| instance.enabled);
-    enabled().for_each(|own| hash_instance(own, hasher));
-    let files = shared.iter().flat_map(|table| table.parameters.asset_paths());
-    files
-        .chain(enabled().flat_map(|own| own.parameters.asset_paths()))
-        .for_each(|path| hash_shared_asset(scene, assets, &path, hasher));
+    let enabled: Vec<&Instance> = scene.instances.iter().filter(|instance| instance.enabled).collect();
+    for instance in &enabled {
+        hash_instance(instance, hasher);
+    }
+    let files_of_tables = shared.iter().flat_map(|table| table.parameters.asset_paths());
+    let files_of_phenomena = enabled.iter().flat_map(|instance| instance.parameters.asset_paths());
+    for path in files_of_tables.chain(files_of_phenomena) {
+        hash_shared_asset(scene, assets, &path, hasher);
+    }
 }
 
-fn hash_table(label: &str, table: Table, hasher: &mut blake3::Hasher) {
-    hasher.update(format!("{label} {}\n", Value::Table(table)).as_bytes());
+/// Hashes a line: a label and a value as text.
+pub(crate) fn hash_line(label: &str, value: impl Display, hasher: &mut blake3::Hasher) {
+    hasher.update(format!("{label} {value}\n").as_bytes());
+}
+
+/// Hashes a line: a label and a table as text.
+pub(crate) fn hash_table(label: &str, table: Table, hasher: &mut blake3::Hasher) {
+    hash_line(label, Value::Table(table), hasher);
 }
 
 fn hash_instance(instance: &Instance, hasher: &mut blake3::Hasher) {

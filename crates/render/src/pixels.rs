@@ -254,28 +254,37 @@ fn convert<T: Copy + Send + Sync>(
     convert: impl Fn(usize, &[[f32; 4]], &mut [T]) + Sync,
 ) {
     let (width, rect) = (frame.beauty.width(), nonzero_rect(frame));
-    let columns = rect.x..rect.right();
-    let convert_row = |y: usize, out: &mut [T]| {
-        if !(rect.y..rect.bottom()).contains(&y) {
-            if let Background::Fill(value) = background {
-                out.fill(value);
-            }
-            return;
-        }
-        if let Background::Fill(value) = background {
-            out[..columns.start].fill(value);
-            out[columns.end..].fill(value);
-        }
-        convert(y, &frame.beauty.row(y)[columns.clone()], &mut out[columns.clone()]);
-    };
     if pixels.is_empty() {
         return;
     }
     if rect.width * rect.height <= serial_pixels {
-        pixels.chunks_mut(width).enumerate().for_each(|(y, out)| convert_row(y, out));
+        convert_rows(frame, rect, 0, background, pixels, &convert);
         return;
     }
-    pixels.par_chunks_mut(width * TASK_ROWS).enumerate().for_each(|(task, chunk)| {
-        chunk.chunks_mut(width).enumerate().for_each(|(row, out)| convert_row(task * TASK_ROWS + row, out));
+    pixels.par_chunks_mut(width * TASK_ROWS).enumerate().for_each(|(task, rows)| {
+        convert_rows(frame, rect, task * TASK_ROWS, background, rows, &convert);
     });
+}
+
+/// [`convert`] for the `rows` of a frame from row `first` on, of which all pixels outside of `rect` are background.
+fn convert_rows<T: Copy>(
+    frame: &Frame,
+    rect: Rect,
+    first: usize,
+    background: Background<T>,
+    rows: &mut [T],
+    convert: impl Fn(usize, &[[f32; 4]], &mut [T]),
+) {
+    for (index, row) in rows.chunks_mut(frame.beauty.width()).enumerate() {
+        let y = first + index;
+        let is_background = !(rect.y..rect.bottom()).contains(&y);
+        let columns = if is_background { 0..0 } else { rect.x..rect.right() };
+        if let Background::Fill(value) = background {
+            row[..columns.start].fill(value);
+            row[columns.end..].fill(value);
+        }
+        if !is_background {
+            convert(y, &frame.beauty.row(y)[columns.clone()], &mut row[columns]);
+        }
+    }
 }

@@ -8,7 +8,7 @@ use bansho_base::{
     frame::FrameHeader,
     host::assets::Assets,
     image::Rect,
-    parameters::{Parameters, Value},
+    parameters::Parameters,
     phenomenon::strip::{Shutter, View},
 };
 
@@ -258,21 +258,18 @@ impl Plan {
     pub fn frame_fingerprint(&self, number: i64, assets: &dyn Assets) -> Fingerprint {
         let mut hasher = blake3::Hasher::new();
         fingerprint::hash_state(&self.scene, assets, &mut hasher);
-        let mut text = |label: &str, value: &dyn std::fmt::Display| {
-            hasher.update(format!("{label} {value}\n").as_bytes());
-        };
-        text("time", &self.time(number));
-        text("number", &number);
-        text("size", &format_args!("{:?} {:?}", self.size, self.window));
-        text("exposure", &self.exposure_ev100);
-        text("outputs", &format_args!("{} {}", self.layers, self.aovs));
-        text("view", &self.display.name());
+        fingerprint::hash_line("time", self.time(number), &mut hasher);
+        fingerprint::hash_line("number", number, &mut hasher);
+        fingerprint::hash_line("size", format_args!("{:?} {:?}", self.size, self.window), &mut hasher);
+        fingerprint::hash_line("exposure", self.exposure_ev100, &mut hasher);
+        fingerprint::hash_line("outputs", format_args!("{} {}", self.layers, self.aovs), &mut hasher);
+        fingerprint::hash_line("view", self.display.name(), &mut hasher);
         if let Some(kelvin) = self.scene.picture.white_balance_k {
-            text("white balance", &kelvin);
+            fingerprint::hash_line("white balance", kelvin, &mut hasher);
         }
-        text("fps", &format_args!("{:?}", self.fps()));
-        text("camera", &Value::Table(self.camera.to_table()));
-        text("plate", &Value::Table(self.scene.plate.to_table()));
+        fingerprint::hash_line("fps", format_args!("{:?}", self.fps()), &mut hasher);
+        fingerprint::hash_table("camera", self.camera.to_table(), &mut hasher);
+        fingerprint::hash_table("plate", self.scene.plate.to_table(), &mut hasher);
         let plate = &self.scene.plate;
         for path in [&plate.image, &plate.depth].into_iter().flatten() {
             fingerprint::hash_asset(assets, &path.0, number, &mut hasher);
@@ -315,6 +312,11 @@ impl Plan {
     }
 }
 
+/// Whether `length` pixels from `start` on, at least one, are within a side of a picture.
+fn is_within_side(start: usize, length: usize, side: usize) -> bool {
+    length > 0 && start < side && length <= side - start
+}
+
 /// The region to draw, in pixels of the picture with its overscan. `crop` is in pixels of the picture without it.
 fn window(size: [usize; 2], overscan: usize, crop: Option<Rect>) -> Result<Rect, PlanError> {
     let limit = bansho_scene::picture::LARGEST_SIDE as usize;
@@ -325,8 +327,7 @@ fn window(size: [usize; 2], overscan: usize, crop: Option<Rect>) -> Result<Rect,
     let Some(crop) = crop else {
         return Ok(Rect::from_size(width + 2 * overscan, height + 2 * overscan));
     };
-    let inside = |start: usize, length: usize, side: usize| length > 0 && start < side && length <= side - start;
-    if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {
+    if !is_within_side(crop.x, crop.width, width) || !is_within_side(crop.y, crop.height, height) {
         return Err(PlanError::CropOutside { crop: [crop.x, crop.y, crop.width, crop.height], size });
     }
     Ok(Rect { x: crop.x + overscan, y: crop.y + overscan, ..crop })

@@ -2,7 +2,7 @@
 
 use std::{
     ops::Range,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use bansho_base::{
@@ -123,16 +123,27 @@ impl PlateRows<'_> {
     /// The log-average luminance of all pixels that shine, to a power of two, and at least display white: a few pixels of any brightness do not change
     /// it.
     fn typical_luminance(&self) -> f32 {
-        let exponents = |y: usize| {
-            let mut light = Vec::new();
-            self.light(y, &mut light);
-            let shining = light.iter().map(|&[r, g, b, _]| luminance([r, g, b])).filter(|value| *value > 0.0);
-            shining.fold([0_i64; 2], |[sum, count], value| [sum + i64::from(value.to_bits() >> 23) - 127, count + 1])
-        };
-        let rows: Vec<[i64; 2]> = (0..self.picture.color.height()).into_par_iter().map(exponents).collect();
+        let rows: Vec<[i64; 2]> =
+            (0..self.picture.color.height()).into_par_iter().map(|y| self.sum_of_exponents(y)).collect();
         let [sum, count] = rows.iter().fold([0; 2], |[sum, count], row| [sum + row[0], count + row[1]]);
         let exponent = sum.div_euclid(count.max(1)).clamp(0, 20);
         (1_u32 << exponent) as f32
+    }
+
+    /// Sum of the binary exponents of the luminances of those pixels of row `y` that shine, and the number of these.
+    fn sum_of_exponents(&self, y: usize) -> [i64; 2] {
+        let mut light = Vec::new();
+        self.light(y, &mut light);
+        let (mut sum, mut count) = (0, 0);
+        for &[r, g, b, _] in &light {
+            let luminance = luminance([r, g, b]);
+            if luminance > 0.0 {
+                // The biased exponent of a positive number follows its 23 bits of fraction.
+                sum += i64::from(luminance.to_bits() >> 23) - 127;
+                count += 1;
+            }
+        }
+        [sum, count]
     }
 
     /// The mean light of a row of boxes, which are these `rows` of pixels, and the number of pixels that are brighter than `brightest`.
@@ -150,9 +161,12 @@ impl PlateRows<'_> {
                 }
             }
         }
-        let count = |column: usize| (side.min(width - column * side) * rows.len()) as f64;
-        let means = sums.iter().enumerate().map(|(column, sum)| sum.map(|sum| (sum / count(column)) as f32));
-        (means.collect(), limited)
+        let mut means = Vec::with_capacity(sums.len());
+        for (column, sum) in sums.iter().enumerate() {
+            let count = (side.min(width - column * side) * rows.len()) as f64;
+            means.push(sum.map(|sum| (sum / count) as f32));
+        }
+        (means, limited)
     }
 }
 
@@ -196,15 +210,18 @@ pub(crate) struct PlateBoxesKey {
 }
 
 impl PlateBoxesCache {
+    fn lock(&self) -> MutexGuard<'_, Option<(PlateBoxesKey, Arc<PlateBoxes>)>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// The boxes of this key, computed by `compute` if they are not known.
     pub(crate) fn get_or_compute(&self, key: PlateBoxesKey, compute: impl FnOnce() -> PlateBoxes) -> Arc<PlateBoxes> {
-        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, boxes)) = lock().as_ref().filter(|(known, _)| *known == key) {
+        if let Some((_, boxes)) = self.lock().as_ref().filter(|(known, _)| *known == key) {
             return boxes.clone();
         }
         // Not while the lock is held: `compute` works in parallel.
         let boxes = Arc::new(compute());
-        *lock() = Some((key, boxes.clone()));
+        *self.lock() = Some((key, boxes.clone()));
         boxes
     }
 }

@@ -5,10 +5,9 @@ use std::sync::{Arc, OnceLock};
 use bansho_base::{
     camera::turns::{SuddenTurn, sudden_turns},
     color,
-    geometry::strokes::DrawingRemark,
     host::{once::get_or_compute, parallel::prelude::*},
     phenomenon::{
-        Phenomenon, Remark,
+        Remark,
         strip::{Shutter, View},
         surroundings::{OtherPhenomena, Publication, PublishedByAll},
     },
@@ -24,7 +23,7 @@ use crate::{
     planning::exposure::assumed_of_plate,
     shot::stepping::scene_publication,
 };
-use bansho_scene::{PLATE_LAYER, PlateRemark};
+use bansho_scene::PLATE_LAYER;
 
 /// A scene during one exposure.
 struct ExposedScene<'a> {
@@ -47,11 +46,19 @@ impl<'a> ExposedScene<'a> {
         }
     }
 
+    fn published(&self) -> &PublishedByAll {
+        get_or_compute(&self.published, || {
+            PublishedByAll::new(self.runs.par_iter().map(|run| run.run.publish(self.shutter)).collect())
+        })
+    }
+
     fn remark(&self, index: usize) -> Option<Remark> {
-        let publish = || PublishedByAll::new(self.runs.par_iter().map(|run| run.run.publish(self.shutter)).collect());
-        let published = || get_or_compute(&self.published, publish);
-        let neighbors = OtherPhenomena { scene: &self.scene, published: &published, own_index: index, sky: &self.sky };
-        self.runs[index].built.phenomenon.remark(&neighbors)
+        self.runs[index].built.phenomenon.remark(&OtherPhenomena {
+            scene: &self.scene,
+            published: &|| self.published(),
+            own_index: index,
+            sky: &self.sky,
+        })
     }
 }
 
@@ -61,8 +68,7 @@ fn of_plate_files(compiled: &CompiledScene) -> Vec<(String, Remark)> {
     let frame = scene.picture.first_frame;
     let read = scene.plate.read_frame(compiled.assets().as_ref(), frame, &scene.plate_view(frame));
     let Ok(Some(pictures)) = read else { return Vec::new() };
-    let remark = |remark: &PlateRemark| (PLATE_LAYER.to_owned(), Remark::new(remark.to_string()));
-    pictures.remarks().iter().map(remark).collect()
+    pictures.remarks().iter().map(|remark| (PLATE_LAYER.to_owned(), Remark::new(remark.to_string()))).collect()
 }
 
 /// Extensions of drawings.
@@ -77,8 +83,9 @@ fn of_drawings(compiled: &CompiledScene) -> Vec<(String, Remark)> {
         paths.dedup();
         for path in paths.iter().filter(|path| DRAWINGS.iter().any(|drawing| path.ends_with(drawing))) {
             let Ok(drawing) = compiled.assets().drawing(path) else { continue };
-            let remark = |remark: &DrawingRemark| (instance.name.clone(), Remark::new(format!("{path}: {remark}")));
-            remarks.extend(drawing.remarks.iter().map(remark));
+            for remark in &drawing.remarks {
+                remarks.push((instance.name.clone(), Remark::new(format!("{path}: {remark}"))));
+            }
         }
     }
     remarks
@@ -121,14 +128,16 @@ fn of_views(compiled: &CompiledScene, plan: &Plan) -> Vec<(String, Remark)> {
         (0..VIEWED_FRAMES).map(|index| frames.start + last * index / (VIEWED_FRAMES - 1)).collect();
     numbers.dedup();
     let views: Vec<View> = numbers.iter().map(|number| plan.view(*number)).collect();
-    let remark = |phenomenon: &Arc<dyn Phenomenon>| {
-        let viewed = numbers.iter().zip(&views);
-        let (number, remark) =
-            viewed.filter_map(|(number, view)| Some((number, phenomenon.view_remark(view)?))).next()?;
-        let message = format!("in frame {number} {}", remark.message);
-        Some((phenomenon.info().name.to_owned(), Remark { message, ..remark }))
-    };
-    compiled.phenomena().filter_map(remark).collect()
+    let mut remarks = Vec::new();
+    for phenomenon in compiled.phenomena() {
+        for (number, view) in numbers.iter().zip(&views) {
+            let Some(remark) = phenomenon.view_remark(view) else { continue };
+            let message = format!("in frame {number} {}", remark.message);
+            remarks.push((phenomenon.info().name.to_owned(), Remark { message, ..remark }));
+            break;
+        }
+    }
+    remarks
 }
 
 /// What users should know about how phenomena will look: the name of each phenomenon, and the remark.
@@ -142,12 +151,14 @@ pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remar
     let frames = plan.frames();
     let shutters = [frames.start, (frames.start + frames.end) / 2, frames.end - 1].map(|number| plan.shutter(number));
     let exposures = shutters.map(|shutter| ExposedScene::new(&context, &runs, shutter));
-    let remark = |index: usize| {
+    let mut of_phenomena = Vec::new();
+    for (index, run) in runs.iter().enumerate() {
         let [first, middle, last] = exposures.each_ref().map(|exposure| exposure.remark(index));
-        let always = first.filter(|remark| Some(remark) == middle.as_ref() && middle == last)?;
-        let holds = !(may_shine_later && always.unless_lit_later);
-        holds.then(|| (runs[index].info().name.to_owned(), always))
-    };
+        let Some(remark) = first.filter(|first| Some(first) == middle.as_ref() && middle == last) else { continue };
+        if !(may_shine_later && remark.unless_lit_later) {
+            of_phenomena.push((run.info().name.to_owned(), remark));
+        }
+    }
     let plate = assumed_of_plate(compiled, plan).map(|ev100| {
         let message = format!(
             "with which exposure it was taken is not known; EV {ev100:.1} (at ISO 100) is assumed, so that its white is {:.0} cd/m^2; \
@@ -157,7 +168,6 @@ pub fn remarks(compiled: &Arc<CompiledScene>, plan: &Plan) -> Vec<(String, Remar
         (PLATE_LAYER.to_owned(), Remark::new(message))
     });
     let of_camera = turns_of_picture(plan).map(|remark| ("camera".to_owned(), remark));
-    let of_phenomena = (0..runs.len()).filter_map(remark);
     plate
         .into_iter()
         .chain(of_plate_files(compiled))

@@ -119,17 +119,10 @@ impl LiveEffect {
         let assets = compiled.assets().clone();
         let compiled = self.pool.run(|| CompiledScene::build(Arc::new(scene), assets, Some(compiled)))?;
         let scene = compiled.scene().clone();
-        let is_kept = |name: &str| {
-            let of_name = |scene: &Scene| {
-                scene
-                    .instances
-                    .iter()
-                    .find(|instance| instance.name == name)
-                    .map(|instance| instance.parameters.clone())
-            };
-            of_name(&before).zip(of_name(&scene)).is_some_and(|(before, after)| Arc::ptr_eq(&before, &after))
-        };
-        self.targets.retain(|name, _| is_kept(name));
+        self.targets.retain(|name, _| {
+            let [before, after] = [&before, &scene].map(|scene| parameters_of(scene, name));
+            before.zip(after).is_some_and(|(before, after)| Arc::ptr_eq(before, after))
+        });
         self.replace_scene(compiled)?;
         let mut plan = self.shot.plan().clone();
         if scene.camera != before.camera {
@@ -193,11 +186,7 @@ impl LiveEffect {
         let limits = Range::new(0.0, 1.0);
         reader.within("flow", |reader| Parameter::check(&flow, &limits, "", reader));
         checked(reader)?;
-        let (index, instance) = self.instance(name)?;
-        let kind = instance.kind.key;
-        let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: GAS_FLOW };
-        let changed = self.target(instance).with_quantity(GAS_FLOW, &[flow]).ok_or_else(not_changeable)?;
-        self.replace(index, changed, IGNITION_S)
+        self.set_quantity(name, GAS_FLOW, &[flow], IGNITION_S)
     }
 
     /// Moves the flame `name` to a position, m, within `seconds`. Gas that burns already stays where it is.
@@ -215,10 +204,22 @@ impl LiveEffect {
             Parameter::check(&seconds, &durations, "s", reader);
         });
         checked(reader)?;
+        self.set_quantity(name, POSITION, &position, seconds)
+    }
+
+    /// Changes a quantity of the phenomenon `name` within `seconds`.
+    fn set_quantity(
+        &mut self,
+        name: &str,
+        quantity: &'static str,
+        value: &[f64],
+        seconds: f64,
+    ) -> Result<(), EffectError> {
         let (index, instance) = self.instance(name)?;
-        let kind = instance.kind.key;
-        let not_changeable = || EffectError::NotChangeable { name: name.to_owned(), kind, what: POSITION };
-        let changed = self.target(instance).with_quantity(POSITION, &position).ok_or_else(not_changeable)?;
+        let Some(changed) = self.target(instance).with_quantity(quantity, value) else {
+            let kind = instance.kind.key;
+            return Err(EffectError::NotChangeable { name: name.to_owned(), kind, what: quantity });
+        };
         self.replace(index, changed, seconds)
     }
 
@@ -301,6 +302,11 @@ impl LiveEffect {
         self.targets.insert(compiled.scene().instances[index].name.clone(), target);
         self.replace_scene(compiled)
     }
+}
+
+/// The parameters of the phenomenon `name` of a scene.
+fn parameters_of<'a>(scene: &'a Scene, name: &str) -> Option<&'a Arc<dyn PhenomenonTable>> {
+    scene.instances.iter().find(|instance| instance.name == name).map(|instance| &instance.parameters)
 }
 
 fn checked(reader: Reader) -> Result<(), ParameterProblems> {

@@ -15,7 +15,7 @@ use bansho_environment::{
 use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
 use bansho_scene::{Instance, Scene, SceneOptions};
 
-use super::{EffectError, LiveEffect, pool::Pool};
+use super::{EffectError, LiveEffect, Pool};
 use crate::SceneBuilder;
 
 /// Most simulation steps of one call by default. A flame of particles takes about 120 a second.
@@ -263,13 +263,12 @@ impl Effect {
     /// Parameters that are out of range, not finite or contradict each other; a size that is not possible; assets that cannot be read.
     pub fn open(self) -> Result<LiveEffect, EffectError> {
         let scene = Arc::new(self.scene()?);
-        let open = || {
+        let shot = self.pool.run(|| {
             let compiled = Arc::new(CompiledScene::build(scene, self.assets.clone(), None)?);
             let mut plan = Plan::new(&compiled, &PlanOptions { size: self.size, ..self.plan.clone() })?;
             plan.fingerprint_frames = false;
             Ok::<Shot, EffectError>(Shot::open(compiled, Arc::new(plan)))
-        };
-        let shot = self.pool.run(open)?;
+        })?;
         let mut live = LiveEffect::new(shot, self.max_steps, self.pool);
         if !self.preroll_in_pieces {
             live.preroll(u64::MAX)?;

@@ -8,7 +8,7 @@ use bansho_base::{
 };
 use bansho_render::{PhenomenonLight, SceneLinear, Shot};
 
-use super::{EffectError, Picture, pool::Pool};
+use super::{EffectError, Picture, Pool};
 
 /// Longest time step, s: more is a mistake of the caller.
 pub const MAX_ADVANCE_S: f64 = 86_400.0;

@@ -11,7 +11,6 @@ mod description;
 mod error;
 mod live;
 mod picture;
-mod pool;
 
 pub use self::{
     description::Effect,
@@ -19,3 +18,30 @@ pub use self::{
     live::{LiveEffect, MAX_ADVANCE_S},
     picture::Picture,
 };
+
+#[cfg(feature = "rayon")]
+use std::sync::Arc;
+
+/// The thread pool in which an effect works: that of the caller's thread, unless one was given. Without the feature `rayon` there is none, and everything
+/// runs on the caller's thread.
+#[derive(Clone, Default)]
+struct Pool {
+    #[cfg(feature = "rayon")]
+    given: Option<Arc<rayon::ThreadPool>>,
+}
+
+impl Pool {
+    #[cfg(feature = "rayon")]
+    fn new(pool: Arc<rayon::ThreadPool>) -> Self {
+        Self { given: Some(pool) }
+    }
+
+    /// Does `work` in the pool.
+    fn run<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        #[cfg(feature = "rayon")]
+        if let Some(pool) = &self.given {
+            return pool.install(work);
+        }
+        work()
+    }
+}

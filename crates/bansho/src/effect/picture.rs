@@ -9,7 +9,7 @@ use bansho_base::{
 };
 use bansho_render::pixels::{self, BufferLengthError, ChannelError, f16};
 
-use super::pool::Pool;
+use super::Pool;
 
 /// A picture of an effect at one time: scene-linear light, exposed so that 1.0 is display white. Rows run from the top.
 pub struct Picture<'a> {

@@ -37,23 +37,28 @@ pub enum FrameListErrorKind {
 /// A range is malformed, runs backward, or has a step of zero, or there are too many frames.
 pub fn parse(text: &str) -> Result<Vec<i64>, FrameListError> {
     let mut frames = Vec::new();
-    for range in text.split(',') {
-        let fail = |kind| FrameListError { range: range.trim().to_owned(), kind };
-        let FrameRange { first, last, step } = parse_range(range.trim()).ok_or(fail(FrameListErrorKind::Form))?;
-        if first > last {
-            return Err(fail(FrameListErrorKind::Backward));
-        }
-        if step == 0 {
-            return Err(fail(FrameListErrorKind::ZeroStep));
-        }
-        if (last - first) / step + frames.len() as i64 >= MAX_FRAMES {
-            return Err(fail(FrameListErrorKind::TooMany));
-        }
-        frames.extend((first..=last).step_by(step as usize));
+    for range in text.split(',').map(str::trim) {
+        append_range(range, &mut frames).map_err(|kind| FrameListError { range: range.to_owned(), kind })?;
     }
     frames.sort_unstable();
     frames.dedup();
     Ok(frames)
+}
+
+/// Appends the frames of a range.
+fn append_range(range: &str, frames: &mut Vec<i64>) -> Result<(), FrameListErrorKind> {
+    let FrameRange { first, last, step } = parse_range(range).ok_or(FrameListErrorKind::Form)?;
+    if first > last {
+        return Err(FrameListErrorKind::Backward);
+    }
+    if step == 0 {
+        return Err(FrameListErrorKind::ZeroStep);
+    }
+    if (last - first) / step + frames.len() as i64 >= MAX_FRAMES {
+        return Err(FrameListErrorKind::TooMany);
+    }
+    frames.extend((first..=last).step_by(step as usize));
+    Ok(())
 }
 
 /// Every `step`-th frame from `first` to `last`.

@@ -149,17 +149,18 @@ impl SceneFile {
 
     /// The text with the changes.
     pub(crate) fn changed(&self) -> Result<String, JobError> {
-        self.changes.iter().try_fold(self.text.clone(), |text, assignment| {
-            let fail = |source| JobError::Edit { assignment: assignment.clone(), source };
-            edit::set(&text, assignment, KINDS).map_err(fail)
-        })
+        let mut text = self.text.clone();
+        for assignment in &self.changes {
+            text = edit::set(&text, assignment, KINDS)
+                .map_err(|source| JobError::Edit { assignment: assignment.clone(), source })?;
+        }
+        Ok(text)
     }
 }
 
 /// Whether the problems of an unchanged file are those of the changed one.
 fn has_problems_of(own: &SceneError, changed: &SceneError) -> bool {
-    let messages = |error: &SceneError| error.problems.iter().map(ToString::to_string).collect::<Vec<_>>();
-    messages(own) == messages(changed)
+    own.problems.iter().map(ToString::to_string).eq(changed.problems.iter().map(ToString::to_string))
 }
 
 fn is_missing(error: &InputError) -> bool {

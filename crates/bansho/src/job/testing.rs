@@ -20,7 +20,7 @@ use bansho_render::{CompiledScene, Plan, PlanOptions, RenderError, SceneLinear, 
 use super::{
     error::JobError,
     observer::{JobObserver, Warning},
-    pipeline::{draw_frames::FrameSink, frame_source::FrameSource},
+    pipeline::{FrameSource, draw_frames::FrameSink},
 };
 
 /// The plan of an empty picture of one pixel.

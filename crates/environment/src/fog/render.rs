@@ -10,13 +10,14 @@ use bansho_base::{
     phenomenon::{
         Prepared,
         strip::{DepthInterval, Strip, View},
-        surroundings::{Occluder, Surroundings},
+        surroundings::Surroundings,
     },
     world::sky::Sky,
 };
 use fearless_simd::{Level, dispatch};
 
 use super::light_in_fog::{LightInFog, Segments};
+use crate::ground::height_of_level_ground;
 
 /// Fog in one frame.
 pub(super) struct PreparedFog<'a> {
@@ -40,11 +41,7 @@ const NO_DEPTH: [f32; LANES] = [f32::INFINITY; LANES];
 impl<'a> PreparedFog<'a> {
     pub(super) fn new(extinction: f64, view: &'a View, surroundings: &Surroundings) -> Self {
         let camera = view.camera.position;
-        let level_height = |solid: &Occluder| match solid {
-            Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
-            _ => None,
-        };
-        let ground = surroundings.others.occluders.iter().filter_map(level_height).max_by(f64::total_cmp);
+        let ground = height_of_level_ground(&surroundings.others.occluders);
         let height = ground.map(|ground| camera.y - ground).filter(|height| *height > 0.0);
         Self {
             level: bansho_base::math::simd::level(),

@@ -103,10 +103,8 @@ pub(super) mod reference {
         const MIN_DISTANCE: f64 = 1e-4;
         let nearest = (position - segment.eye).dot(segment.direction);
         let height = (segment.eye + segment.direction * nearest - position).length().max(MIN_DISTANCE);
-        let angle = |distance: f64| {
-            if distance.is_finite() { math::atan2(distance - nearest, height) } else { FRAC_PI_2 }
-        };
-        let (first, last) = (angle(segment.begin), angle(segment.end));
+        let [first, last] = [segment.begin, segment.end]
+            .map(|distance| if distance.is_finite() { math::atan2(distance - nearest, height) } else { FRAC_PI_2 });
         let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
         let mut sum = [0.0_f64; 3];
         let nodes = if half < f64::from(SMALL_ANGLE) { FEW_NODES.as_slice() } else { MANY_NODES.as_slice() };

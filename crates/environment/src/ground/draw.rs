@@ -252,18 +252,18 @@ impl PreparedGround<'_> {
     fn project_lanes<S: Simd>(
         &self,
         simd: S,
-        [x, y, z]: [Lanes<S>; 3],
+        directions: [Lanes<S>; 3],
         (xs, ys): (&mut [f32; LANES], &mut [f32; LANES]),
     ) {
         let camera = &self.view.camera;
-        let splat = |value: f64| Lanes::splat(simd, value as f32);
         let axes = &camera.world_from_camera;
-        let along = |axis: DVec3| x.fma(splat(axis.x), y.fma(splat(axis.y), z * splat(axis.z)));
-        let ahead = along(-axes.z_axis);
-        let per_depth = splat(camera.focal_pixels) / ahead;
-        let across = along(axes.x_axis).fma(per_depth, splat(camera.principal_point.x));
-        let down = along(-axes.y_axis).fma(per_depth, splat(camera.principal_point.y));
-        let nearest = splat((camera.near / HORIZON).max(1e-9));
+        let ahead = component_along(simd, directions, -axes.z_axis);
+        let per_depth = Lanes::splat(simd, camera.focal_pixels as f32) / ahead;
+        let [center_x, center_y] = [camera.principal_point.x as f32, camera.principal_point.y as f32];
+        let across = component_along(simd, directions, axes.x_axis).fma(per_depth, Lanes::splat(simd, center_x));
+        let down = component_along(simd, directions, -axes.y_axis).fma(per_depth, Lanes::splat(simd, center_y));
+        // Directions beside or behind the camera keep the positions that the caller has given them.
+        let nearest = Lanes::splat(simd, (camera.near / HORIZON).max(1e-9) as f32);
         ahead.select_lt(nearest, Lanes::from_slice(simd, xs), across).store_slice(xs);
         ahead.select_lt(nearest, Lanes::from_slice(simd, ys), down).store_slice(ys);
     }
@@ -278,6 +278,14 @@ impl PreparedGround<'_> {
             }
         }
     }
+}
+
+/// The components of sixteen vectors along an axis.
+#[inline(always)]
+fn component_along<S: Simd>(simd: S, [x, y, z]: [Lanes<S>; 3], axis: DVec3) -> Lanes<S> {
+    let [along_x, along_y, along_z] = [axis.x as f32, axis.y as f32, axis.z as f32];
+    let rest = y.fma(Lanes::splat(simd, along_y), z * Lanes::splat(simd, along_z));
+    x.fma(Lanes::splat(simd, along_x), rest)
 }
 
 impl Prepared for PreparedGround<'_> {

@@ -37,8 +37,8 @@ impl<S: Simd> Hits<S> {
     #[inline(always)]
     pub(super) fn new(simd: S, camera: &Camera, camera_height: f64, x: usize, y: usize) -> Self {
         let directions = Directions::new(camera, x, y);
-        let splat = |value: f32| Lanes::splat(simd, value);
         let focal = camera.focal_pixels as f32;
+        let focal_lanes = Lanes::splat(simd, focal);
         let direction = [
             Lanes::from_slice(simd, &directions.components[0]),
             Lanes::from_slice(simd, &directions.components[1]),
@@ -49,15 +49,18 @@ impl<S: Simd> Hits<S> {
             seen[i] = if directions.visible[i] { 1.0 } else { 0.0 };
         }
         let [dx, dy, dz] = direction;
-        let per_length = splat(1.0) / dx.fma(dx, dy.fma(dy, dz * dz)).simd_sqrt();
-        let toward = splat(0.0) - per_length;
+        let per_length = Lanes::splat(simd, 1.0) / dx.fma(dx, dy.fma(dy, dz * dz)).simd_sqrt();
+        let toward = Lanes::splat(simd, 0.0) - per_length;
         let viewer = [dx * toward, dy * toward, dz * toward];
         // A pixel subtends about 1 / focal radians.
-        let coverage = viewer[1].fma(splat(focal), splat(0.5)).simd_clamp01() * Lanes::from_slice(simd, &seen);
-        let cos = viewer[1].simd_max(splat(0.5 / focal));
-        let distance = (splat(camera_height as f32) / cos).simd_min(splat((HORIZON * 0.5) as f32));
+        let below_horizon = viewer[1].fma(focal_lanes, Lanes::splat(simd, 0.5)).simd_clamp01();
+        let coverage = below_horizon * Lanes::from_slice(simd, &seen);
+        let cos = viewer[1].simd_max(Lanes::splat(simd, 0.5 / focal));
+        let height = Lanes::splat(simd, camera_height as f32);
+        let distance = (height / cos).simd_min(Lanes::splat(simd, (HORIZON * 0.5) as f32));
         let depth = distance * per_length;
-        let footprint = distance / (splat(focal) * cos.simd_max(splat(1e-6)).simd_sqrt());
+        // Across the line of sight a pixel covers distance / focal, along it that divided by the cosine.
+        let footprint = distance / (focal_lanes * cos.simd_max(Lanes::splat(simd, 1e-6)).simd_sqrt());
         Self { offset: [dx * depth, dy * depth, dz * depth], viewer, depth, cos, footprint, coverage }
     }
 
@@ -85,10 +88,10 @@ impl RowDepths {
 
     /// The first row, and the one past the last, of ground in a depth interval.
     pub(super) fn rows(&self, slice: &DepthInterval) -> (usize, usize) {
-        let overlaps = |depths: &Option<DepthInterval>| depths.is_some_and(|depths| depths.overlaps(slice));
-        let first = self.0.iter().position(overlaps).unwrap_or(0);
-        let end = self.0.iter().rposition(overlaps).map_or(0, |last| last + 1);
-        (first * BLOCK_ROWS, end * BLOCK_ROWS)
+        let mut blocks = (0..self.0.len()).filter(|&block| self.overlaps(block * BLOCK_ROWS, slice));
+        let Some(first) = blocks.next() else { return (0, 0) };
+        let last = blocks.next_back().unwrap_or(first);
+        (first * BLOCK_ROWS, (last + 1) * BLOCK_ROWS)
     }
 }
 

@@ -51,19 +51,17 @@ pub(super) fn blurred_reflection(reflection: SampledImage, view: &View, slope: f
 /// the blur is normalized by the blurred coverage.
 fn columns_with_coverage(image: &Image<4>, first: usize, elevation_sines: &[f64]) -> Vec<[f32; 4 * COLUMNS]> {
     let count = COLUMNS.min(image.width() - first);
-    let rows = elevation_sines.iter().enumerate();
-    let row = |(y, sine): (usize, &f64)| {
-        let mut values = [0.0; 4 * COLUMNS];
+    let mut rows = vec![[0.0; 4 * COLUMNS]; elevation_sines.len()];
+    for (y, (row, sine)) in rows.iter_mut().zip(elevation_sines).enumerate() {
         if *sine > 0.0 {
-            let (pixels, _) = values.as_chunks_mut();
+            let (pixels, _) = row.as_chunks_mut();
             for (value, pixel) in pixels.iter_mut().zip(&image.row(y)[first..first + count]) {
                 let [red, green, blue, _] = *pixel;
                 *value = [red, green, blue, 1.0];
             }
         }
-        values
-    };
-    rows.map(row).collect()
+    }
+    rows
 }
 
 /// Sine of the angle between the plane and the line of sight through the picture's center column, `y` pixels from its top;

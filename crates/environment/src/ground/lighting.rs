@@ -64,17 +64,17 @@ pub(super) struct ArrivingLight<S: Simd> {
 
 impl GroundLight {
     pub(super) fn new(light: &Light, camera: DVec3) -> Self {
-        let single = |vector: DVec3| vector.as_vec3().to_array();
-        let offset =
-            |position: DVec3| single((position - camera).clamp(DVec3::splat(-MAX_OFFSET), DVec3::splat(MAX_OFFSET)));
         let geometry = match light.emitter {
-            Emitter::Directional { toward } => Geometry::Directional(single(toward)),
-            Emitter::Point { position, radius } => {
-                Geometry::Near { offset: offset(position), radius: radius.min(MAX_OFFSET) as f32, cone: None }
-            }
+            Emitter::Directional { toward } => Geometry::Directional(toward.as_vec3().to_array()),
+            Emitter::Point { position, radius } => Geometry::Near {
+                offset: offset_from_camera(position, camera),
+                radius: radius.min(MAX_OFFSET) as f32,
+                cone: None,
+            },
             Emitter::Spot { position, axis, cos_inner, cos_outer } => {
-                let cone = Cone { axis: single(axis), cos_inner: cos_inner as f32, cos_outer: cos_outer as f32 };
-                Geometry::Near { offset: offset(position), radius: 0.0, cone: Some(cone) }
+                let axis = axis.as_vec3().to_array();
+                let cone = Cone { axis, cos_inner: cos_inner as f32, cos_outer: cos_outer as f32 };
+                Geometry::Near { offset: offset_from_camera(position, camera), radius: 0.0, cone: Some(cone) }
             }
         };
         Self { intensity: light.intensity, geometry }
@@ -83,38 +83,48 @@ impl GroundLight {
     /// The light that arrives at points relative to the camera, without shadows: [`Light::incident_light`].
     #[inline(always)]
     pub(super) fn arriving<S: Simd>(&self, simd: S, points: &[Lanes<S>; 3]) -> ArrivingLight<S> {
-        let splat = |value: f32| Lanes::splat(simd, value);
+        let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let (offset, radius, cone) = match &self.geometry {
             Geometry::Directional([x, y, z]) => {
-                let toward = [splat(*x), splat(*y), splat(*z)];
-                return ArrivingLight { factor: splat(1.0), toward, distance: splat(0.0), angular_radius: splat(0.0) };
+                let toward = [Lanes::splat(simd, *x), Lanes::splat(simd, *y), Lanes::splat(simd, *z)];
+                return ArrivingLight { factor: one, toward, distance: zero, angular_radius: zero };
             }
             Geometry::Near { offset, radius, cone } => (offset, *radius, cone),
         };
-        let (x, y, z) = (splat(offset[0]) - points[0], splat(offset[1]) - points[1], splat(offset[2]) - points[2]);
+        let x = Lanes::splat(simd, offset[0]) - points[0];
+        let y = Lanes::splat(simd, offset[1]) - points[1];
+        let z = Lanes::splat(simd, offset[2]) - points[2];
         let square = x.fma(x, y.fma(y, z * z));
-        let per_distance = square.simd_max(splat(1e-24)).simd_rsqrt();
+        // At the light itself the direction is any: the lower bounds only keep infinities and NaN away.
+        let per_distance = square.simd_max(Lanes::splat(simd, 1e-24)).simd_rsqrt();
         let toward = [x * per_distance, y * per_distance, z * per_distance];
-        let mut factor = splat(1.0) / square.simd_max(splat((radius * radius).max(1e-12)));
+        // Within the sphere the illuminance is that on its surface.
+        let mut factor = one / square.simd_max(Lanes::splat(simd, (radius * radius).max(1e-12)));
         if let Some(cone) = cone {
             factor *= cone.falloff(&toward);
         }
         let distance = square * per_distance;
-        let angular_radius = splat(radius) / distance.simd_max(splat(radius.max(1e-12)));
+        let angular_radius = Lanes::splat(simd, radius) / distance.simd_max(Lanes::splat(simd, radius.max(1e-12)));
         ArrivingLight { factor, toward, distance, angular_radius }
     }
+}
+
+/// The vector from the camera to a position, m.
+fn offset_from_camera(position: DVec3, camera: DVec3) -> [f32; 3] {
+    let offset = (position - camera).clamp(DVec3::splat(-MAX_OFFSET), DVec3::splat(MAX_OFFSET));
+    offset.as_vec3().to_array()
 }
 
 impl Cone {
     /// Fraction of the intensity toward points from which the light is seen in directions (unit vectors).
     #[inline(always)]
     fn falloff<S: Simd>(&self, toward: &[Lanes<S>; 3]) -> Lanes<S> {
-        let splat = |value: f32| toward[0].broadcast(value);
-        let [x, y, z] = self.axis;
-        let cos = toward[0].fma(splat(-x), toward[1].fma(splat(-y), toward[2] * splat(-z)));
+        let [x, y, z] = *toward;
+        let [along_x, along_y, along_z] = self.axis;
+        let cos = x.fma(x.broadcast(-along_x), y.fma(x.broadcast(-along_y), z * x.broadcast(-along_z)));
         let range = (self.cos_inner - self.cos_outer).max(1e-9);
-        let t = ((cos - splat(self.cos_outer)) / splat(range)).simd_clamp01();
-        t * t * splat(-2.0).fma(t, splat(3.0))
+        let t = ((cos - x.broadcast(self.cos_outer)) / x.broadcast(range)).simd_clamp01();
+        t * t * x.broadcast(-2.0).fma(t, x.broadcast(3.0))
     }
 }
 

@@ -50,6 +50,7 @@ mod waves;
 mod wet_reflection;
 pub use model::Ground;
 pub use parameters::{GroundKind, GroundParameters};
+pub(crate) use phenomenon::height_of_level_ground;
 
 #[cfg(test)]
 mod tests;

@@ -34,17 +34,18 @@ impl Ground {
         const SIDE: usize = 5;
         let camera = &view.camera;
         let height = camera.position.y - self.parameters.height;
-        let path = |index: usize| {
+        let mut longest = 0.0_f64;
+        for index in 0..SIDE * SIDE {
             let place = DVec2::new((index % SIDE) as f64, (index / SIDE) as f64) / (SIDE - 1) as f64;
             // Within the picture, so that a dome shows the middles of its sides.
             let pixel = DVec2::from(camera.size) * (0.02 + 0.96 * place);
-            let Some(direction) = camera.direction(pixel).map(DVec3::normalize) else { return 0.0 };
+            let Some(direction) = camera.direction(pixel).map(DVec3::normalize) else { continue };
             let is_below = direction.y * height < 0.0;
             let distance = if is_below { (-height / direction.y).min(HORIZON) } else { HORIZON };
             let point = camera.position + direction * distance;
-            cameras.path_pixels(|_| point)
-        };
-        (0..SIDE * SIDE).map(path).fold(0.0, f64::max)
+            longest = longest.max(cameras.path_pixels(|_| point));
+        }
+        longest
     }
 
     /// The parts of an exposure in which the shortest waves of a lake pass by an eighth of their length.
@@ -64,8 +65,9 @@ fn shadow_motion(view: &View, surroundings: &Surroundings) -> f64 {
     if others.shadow_motion <= 0.0 {
         return 0.0;
     }
-    let distance = |center: DVec3, radius: f64| ((center - view.camera.position).length() - radius).max(0.5);
-    let spheres = others.shadow_casters.iter().filter_map(|caster| caster.bounding_sphere());
-    let nearest = spheres.map(|(center, radius)| distance(center, radius)).fold(f64::INFINITY, f64::min);
+    let mut nearest = f64::INFINITY;
+    for (center, radius) in others.shadow_casters.iter().filter_map(|caster| caster.bounding_sphere()) {
+        nearest = nearest.min(((center - view.camera.position).length() - radius).max(0.5));
+    }
     others.shadow_motion * view.camera.focal_pixels / nearest
 }

@@ -22,6 +22,15 @@ use super::{
     shade::PreparedGround,
 };
 
+/// Height of the ground among what others publish, m: that of the highest level half space.
+pub(crate) fn height_of_level_ground(occluders: &[Occluder]) -> Option<f64> {
+    let heights = occluders.iter().filter_map(|solid| match solid {
+        Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
+        _ => None,
+    });
+    heights.max_by(f64::total_cmp)
+}
+
 impl Phenomenon for Ground {
     fn info(&self) -> PhenomenonInfo<'_> {
         let dry = self.parameters.wetness.constant() == Some(0.0) && self.parameters.kind != GroundKind::Water;

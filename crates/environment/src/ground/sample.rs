@@ -36,10 +36,13 @@ impl SampledImage<'_> {
             let (row, down) = split(ys[i].fma(scale, above), height);
             let right = (column + 1).min(width - 1);
             let (upper, lower) = (self.image.row(row), self.image.row((row + 1).min(height - 1)));
-            let lanes = |pixel: &[f32; 4]| FourLanes::from_slice(simd, pixel);
             let (across, down) = (FourLanes::splat(simd, across), FourLanes::splat(simd, down));
-            let (a, c) = (lanes(&upper[column]), lanes(&lower[column]));
-            let (upper, lower) = (across.fma(lanes(&upper[right]) - a, a), across.fma(lanes(&lower[right]) - c, c));
+            let upper_left = FourLanes::from_slice(simd, &upper[column]);
+            let upper_right = FourLanes::from_slice(simd, &upper[right]);
+            let lower_left = FourLanes::from_slice(simd, &lower[column]);
+            let lower_right = FourLanes::from_slice(simd, &lower[right]);
+            let upper = across.fma(upper_right - upper_left, upper_left);
+            let lower = across.fma(lower_right - lower_left, lower_left);
             let color: [f32; 4] = down.fma(lower - upper, upper).into();
             for c in 0..3 {
                 planes[c][i] = color[c];

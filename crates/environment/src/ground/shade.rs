@@ -135,18 +135,18 @@ impl PreparedGround<'_> {
     /// Albedo as the water leaves it.
     #[inline(always)]
     fn albedo<S: Simd>(&self, simd: S, samples: &SurfaceSamples) -> [Lanes<S>; 3] {
-        let splat = |value: f32| Lanes::splat(simd, value);
-        let mut albedo = [splat(WATER_ALBEDO); 3];
+        let mut albedo = [Lanes::splat(simd, WATER_ALBEDO); 3];
         if self.parameters.kind == GroundKind::Water {
             return albedo;
         }
-        let wet = splat(wet_albedo_factor(self.wetness) as f32);
+        let one = Lanes::splat(simd, 1.0);
+        let wet = Lanes::splat(simd, wet_albedo_factor(self.wetness) as f32);
         let darkening = if self.parameters.kind == GroundKind::Plate { 0.0 } else { PUDDLE_DARKENING * self.wetness };
         let puddle = Lanes::from_slice(simd, &samples.puddle);
-        let factor = wet * puddle.fma(splat(-darkening as f32), splat(1.0));
+        let factor = wet * puddle.fma(Lanes::splat(simd, -darkening as f32), one);
         let shade = Lanes::from_slice(simd, &samples.shade);
         for c in 0..3 {
-            albedo[c] = (splat(self.surface.albedo[c]) * shade).simd_min(splat(1.0)) * factor;
+            albedo[c] = (Lanes::splat(simd, self.surface.albedo[c]) * shade).simd_min(one) * factor;
         }
         albedo
     }
@@ -154,16 +154,16 @@ impl PreparedGround<'_> {
     /// The film of water; `None` if there is none, or puddles cover it in all pixels.
     #[inline(always)]
     fn film<S: Simd>(&self, simd: S, hits: &Hits<S>, samples: &SurfaceSamples) -> Option<Film<S>> {
-        let lanes = |values: &[f32; LANES]| Lanes::from_slice(simd, values);
-        let open = Lanes::splat(simd, 1.0) - lanes(&samples.puddle);
+        let open = Lanes::splat(simd, 1.0) - Lanes::from_slice(simd, &samples.puddle);
         if !self.has_film || !any_positive(open) {
             return None;
         }
-        let grain = Lanes::splat(simd, self.surface.grain_slope() as f32);
+        let film_slope = Lanes::from_slice(simd, &samples.film_slope);
+        let grain_slope = Lanes::splat(simd, self.surface.grain_slope() as f32);
         let microfacets = Microfacets {
-            tilt: [lanes(&samples.tilt[0]), lanes(&samples.tilt[1])],
-            slopes: [lanes(&samples.film_slope), grain],
-            film: lanes(&samples.film),
+            tilt: [Lanes::from_slice(simd, &samples.tilt[0]), Lanes::from_slice(simd, &samples.tilt[1])],
+            slopes: [film_slope, grain_slope],
+            film: Lanes::from_slice(simd, &samples.film),
         };
         Some(Film { microfacets, viewer: FilmDirection::new(hits.viewer) })
     }
@@ -253,8 +253,11 @@ impl PreparedGround<'_> {
             return planes;
         }
         let mut planes = [[0.0; LANES]; 3];
-        let tabulate = || sky.night().map(|night| NightSky::new(sky, night, 0.0, SkyObserver::ON_THE_GROUND));
-        if let Some(night_sky) = self.night_sky.get_or_init(tabulate) {
+        let night_sky = self.night_sky.get_or_init(|| {
+            let night = sky.night()?;
+            Some(NightSky::new(sky, night, 0.0, SkyObserver::ON_THE_GROUND))
+        });
+        if let Some(night_sky) = night_sky {
             let colors = night_sky.radiance(simd, &Directions { components: toward, visible: [true; LANES] });
             for i in 0..LANES {
                 for c in 0..3 {

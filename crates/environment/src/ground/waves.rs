@@ -63,24 +63,7 @@ pub(super) struct WaveSlopes {
 impl Waves {
     /// The waves at time `t` around an `origin` (x, z). Phases are exact there, however far it is.
     pub(super) fn new(parameters: &WaveParameters, t: f64, origin: DVec2) -> Self {
-        let WaveParameters { key, slope, longest, heading, loop_s } = *parameters;
-        let wave = |index: usize| {
-            let words = key.words(index as u64, 0, Purpose::named("wave"));
-            let [turn, phase] = [uniform_f64(words[0], words[1]), uniform_f64(words[2], words[3])];
-            let fraction = index as f64 / (WAVE_COUNT - 1) as f64;
-            let length = longest * math::pow(LENGTH_RATIO, -fraction);
-            let along = heading.rotate(unit_vector((2.0 * turn - 1.0) * MAX_ANGLE));
-            let frequency = quantize_frequency(frequency(length), loop_s) * t;
-            let amplitude = slope * math::sqrt(2.0 / WAVE_COUNT as f64);
-            let turns = (along.dot(origin) / length).rem_euclid(1.0) + phase - frequency.rem_euclid(1.0);
-            Wave {
-                turns_per_meter: (along / length).as_vec2().to_array(),
-                length: length as f32,
-                phase: turns.rem_euclid(1.0) as f32,
-                slope: (along * amplitude).as_vec2().to_array(),
-            }
-        };
-        Self { waves: (0..WAVE_COUNT).map(wave).collect() }
+        Self { waves: (0..WAVE_COUNT).map(|index| wave(parameters, index, t, origin)).collect() }
     }
 
     /// The slopes at positions (x, z) relative to the origin, filtered with the pixels' `footprint`, m.
@@ -108,6 +91,27 @@ impl Waves {
             }
         }
         slopes
+    }
+}
+
+/// The wave with this index, from the longest to the shortest, at time `t` around an `origin` (x, z).
+fn wave(parameters: &WaveParameters, index: usize, t: f64, origin: DVec2) -> Wave {
+    let WaveParameters { key, slope, longest, heading, loop_s } = *parameters;
+    let words = key.words(index as u64, 0, Purpose::named("wave"));
+    let [turn, phase] = [uniform_f64(words[0], words[1]), uniform_f64(words[2], words[3])];
+    let fraction = index as f64 / (WAVE_COUNT - 1) as f64;
+    let length = longest * math::pow(LENGTH_RATIO, -fraction);
+    let along = heading.rotate(unit_vector((2.0 * turn - 1.0) * MAX_ANGLE));
+    let periods = quantize_frequency(frequency(length), loop_s) * t;
+    // The mean square of a cosine is 1/2.
+    let amplitude = slope * math::sqrt(2.0 / WAVE_COUNT as f64);
+    // Whole turns are left out while the numbers are double: far from the world's origin, or late, single precision would lose the phase.
+    let turns = (along.dot(origin) / length).rem_euclid(1.0) + phase - periods.rem_euclid(1.0);
+    Wave {
+        turns_per_meter: (along / length).as_vec2().to_array(),
+        length: length as f32,
+        phase: turns.rem_euclid(1.0) as f32,
+        slope: (along * amplitude).as_vec2().to_array(),
     }
 }
 

@@ -46,28 +46,29 @@ impl<R: Real> Microfacets<R> {
     /// cos_viewer)` (Cook & Torrance 1982). A light of angular diameter `width` widens the distribution.
     #[inline(always)]
     pub(super) fn specular_lobe(&self, light: &FilmDirection<R>, viewer: &FilmDirection<R>, width: R) -> R {
-        let splat = |value: f32| width.broadcast(value);
+        let (zero, quarter) = (width.broadcast(0.0), width.broadcast(0.25));
         let ([lx, ly, lz], [vx, vy, vz]) = (light.toward, viewer.toward);
         // The vector halfway, of length 2 cos(angle of incidence), whose slope is that of the facets that mirror the light.
-        let (x, y, z) = (lx + vx, (ly + vy).simd_max(splat(1e-6)), lz + vz);
+        let (x, y, z) = (lx + vx, (ly + vy).simd_max(width.broadcast(1e-6)), lz + vz);
         let length_squared = x.fma(x, y.fma(y, z * z));
-        let per_y = splat(1.0) / y;
-        let (slope_x, slope_z) = (splat(0.0) - x.fma(per_y, self.tilt[0]), splat(0.0) - z.fma(per_y, self.tilt[1]));
+        let per_y = width.broadcast(1.0) / y;
+        let (slope_x, slope_z) = (zero - x.fma(per_y, self.tilt[0]), zero - z.fma(per_y, self.tilt[1]));
         let square = slope_x.fma(slope_x, slope_z * slope_z);
-        let source = (splat(0.25) * width) * (splat(0.25) * width);
-        let mut facets = [splat(0.0); 2];
+        let source = (quarter * width) * (quarter * width);
+        let mut facets = [zero; 2];
         for kind in 0..2 {
-            let slope = self.slopes[kind].simd_max(splat(1e-3));
+            let slope = self.slopes[kind].simd_max(width.broadcast(1e-3));
             let tans = [light.tan_squared, viewer.tan_squared];
             facets[kind] = gtr3_distribution_with_masking(square, slope.fma(slope, source), tans);
         }
         let facets = self.film.fma(facets[0] - facets[1], facets[1]);
         let cos_squared = y * y / length_squared;
         let cos_incidence = vx.fma(x, vy.fma(y, vz * z)) / length_squared.simd_sqrt();
-        let lobe =
-            fresnel(cos_incidence) * facets / (splat(4.0) * vy.simd_max(splat(1e-3)) * (cos_squared * cos_squared));
-        let lit = splat(0.0).select_lt(ly, lobe, splat(0.0));
-        splat(0.0).select_lt(vy, lit, splat(0.0))
+        let cos_viewer = vy.simd_max(width.broadcast(1e-3));
+        // D is a distribution of slopes: cos^-4 makes it one of normals.
+        let lobe = fresnel(cos_incidence) * facets / (width.broadcast(4.0) * cos_viewer * (cos_squared * cos_squared));
+        let lit = zero.select_lt(ly, lobe, zero);
+        zero.select_lt(vy, lit, zero)
     }
 
     /// Mean slope toward a viewer.
@@ -83,13 +84,14 @@ impl<R: Real> Microfacets<R> {
 fn gtr3_distribution_with_masking<R: Real>(square: R, slope_squared: R, tan_squared: [R; 2]) -> R {
     /// Square of the scale at which the median slope equals that of a Gaussian: `2 ln 2 / (sqrt 2 - 1)`.
     const MEDIAN: f32 = 3.346_817;
-    let splat = |value: f32| square.broadcast(value);
-    let width = splat(MEDIAN) * slope_squared;
-    let tail = splat(1.0) + square / width;
-    let root = |tan_squared: R| width.fma(tan_squared, splat(1.0)).simd_sqrt();
-    // 1 + masking of light + masking of viewer, where masking is `(root - 1) / 2`.
-    let masking = splat(0.5) * (root(tan_squared[0]) + root(tan_squared[1]));
-    splat(2.0) / (splat(std::f32::consts::PI) * width * (tail * tail * tail) * masking)
+    let one = square.broadcast(1.0);
+    let width = square.broadcast(MEDIAN) * slope_squared;
+    let tail = one + square / width;
+    // Smith's masking of either is `(root - 1) / 2`, and G is `1 / (1 + masking of light + masking of viewer)`.
+    let light_root = width.fma(tan_squared[0], one).simd_sqrt();
+    let viewer_root = width.fma(tan_squared[1], one).simd_sqrt();
+    let masking = square.broadcast(0.5) * (light_root + viewer_root);
+    square.broadcast(2.0) / (square.broadcast(std::f32::consts::PI) * width * (tail * tail * tail) * masking)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use bansho_base::{
     color,
+    math::DVec3,
     phenomenon::{
         strip::{View, parts_of_motion},
         surroundings::{Emitter, Light},
@@ -47,12 +48,14 @@ impl Lamps {
         if is_still && cameras.is_still() {
             return 1;
         }
-        let position = |lamp: usize, t: f64| {
-            let at = times.iter().position(|time| *time == t).unwrap_or(0);
-            path[at].get(lamp).and_then(|lamp| lamp.light.emitter.position()).unwrap_or(view.camera.position)
-        };
         let count = path[0].len();
-        let motion = (0..count).map(|lamp| cameras.path_pixels(|t| position(lamp, t))).fold(0.0, f64::max);
+        let mut motion = 0.0_f64;
+        for lamp in 0..count {
+            motion = motion.max(cameras.path_pixels(|t| {
+                let at = times.iter().position(|time| *time == t).unwrap_or(0);
+                path[at].get(lamp).and_then(|lamp| lamp.light.emitter.position()).unwrap_or(view.camera.position)
+            }));
+        }
         let moved = parts_of_motion(motion, PIXELS_PER_PART, MAX_PARTS.max(view.shutter.max_parts()));
         if (0..count).any(|lamp| flashes(path.each_ref().map(|lamps| lamps.get(lamp)))) {
             moved.max(FLASH_PARTS)
@@ -70,9 +73,13 @@ fn flashes(path: [Option<&Lamp>; 5]) -> bool {
     let luminances = lamps.iter().map(|lamp| color::luminance(lamp.light.intensity));
     let (mean, highest) = (luminances.clone().sum::<f32>() / lamps.len().max(1) as f32, luminances.fold(0.0, f32::max));
     let middle = lamps.get(lamps.len() / 2).map_or(0.0, |lamp| color::luminance(lamp.light.intensity));
-    let axis = |lamp: &Lamp| match lamp.light.emitter {
+    (mean - middle).abs() > TOLERANCE * highest || lamps.iter().any(|lamp| spot_axis(lamp) != spot_axis(lamps[0]))
+}
+
+/// The axis of a spot; `None` for other lights.
+fn spot_axis(lamp: &Lamp) -> Option<DVec3> {
+    match lamp.light.emitter {
         Emitter::Spot { axis, .. } => Some(axis),
         Emitter::Point { .. } | Emitter::Directional { .. } => None,
-    };
-    (mean - middle).abs() > TOLERANCE * highest || lamps.iter().any(|lamp| axis(lamp) != axis(lamps[0]))
+    }
 }

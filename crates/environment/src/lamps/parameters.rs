@@ -46,19 +46,26 @@ bansho_base::parameters! {
     }
 }
 
+/// How many steps it is along a path of a sphere, each so short that it shines on its surroundings in nearly the same way.
+fn steps_of_path(from: DVec3, to: DVec3, radius: f64) -> f64 {
+    /// Length of a step of a small sphere, m.
+    const STEP_M: f64 = 0.05;
+    (to - from).length() / STEP_M.max(0.5 * radius)
+}
+
 /// How many steps it is from one light to another that shine on their surroundings in nearly the same way.
 fn steps_between(from: &Light, to: &Light) -> f64 {
-    /// Lengths of a step, m and radians, and its change of intensity relative to the larger one.
-    const STEP_M: f64 = 0.05;
+    /// Angle of a step, radians, and its change of intensity relative to the larger one.
     const STEP_RADIANS: f64 = 0.01;
     const STEP_INTENSITY: f64 = 0.05;
     let [before, after] = [from, to].map(|light| f64::from(luminance(light.intensity)));
     let change = (after - before).abs() / before.max(after).max(f64::MIN_POSITIVE) / STEP_INTENSITY;
-    let distance = |a: DVec3, b: DVec3, radius: f64| (b - a).length() / STEP_M.max(0.5 * radius);
     let moved = match (from.emitter, to.emitter) {
-        (Emitter::Point { position, radius }, Emitter::Point { position: end, .. }) => distance(position, end, radius),
+        (Emitter::Point { position, radius }, Emitter::Point { position: end, .. }) => {
+            steps_of_path(position, end, radius)
+        }
         (Emitter::Spot { position, axis, .. }, Emitter::Spot { position: end, axis: turned, .. }) => {
-            distance(position, end, 0.0) + (turned - axis).length() / STEP_RADIANS
+            steps_of_path(position, end, 0.0) + (turned - axis).length() / STEP_RADIANS
         }
         (Emitter::Directional { toward }, Emitter::Directional { toward: turned }) => {
             (turned - toward).length() / STEP_RADIANS

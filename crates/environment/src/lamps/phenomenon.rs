@@ -38,11 +38,14 @@ impl Run for Lamps {
     }
 
     fn depth_intervals(&self, view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
-        let discs = (self.at)(view.shutter.middle());
-        // Glare arises in the lens, in front of everything.
-        let near = |disc: &Disc| if has_glare(view) { 0.0 } else { disc.depth };
-        let depth = |disc: Disc| DepthInterval { near: near(&disc), far: disc.depth.next_up() };
-        discs.iter().filter_map(|lamp| project_lamp(lamp, view)).map(depth).collect()
+        let mut intervals = Vec::new();
+        for lamp in (self.at)(view.shutter.middle()) {
+            let Some(disc) = project_lamp(&lamp, view) else { continue };
+            // Glare arises in the lens, in front of everything.
+            let near = if has_glare(view) { 0.0 } else { disc.depth };
+            intervals.push(DepthInterval { near, far: disc.depth.next_up() });
+        }
+        intervals
     }
 
     fn exposure_parts(&self, view: &View, _surroundings: &Surroundings) -> usize {

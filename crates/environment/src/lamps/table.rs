@@ -36,11 +36,10 @@ impl SharedTable for LightParameters {
     /// A directed light needs a direction, and the inner cone of a spot must not exceed its outer cone. An inner cone that the file does not state is
     /// limited to the outer one.
     fn conflicts(&self, is_stated: &dyn Fn(&str) -> bool) -> Vec<BuildError> {
-        let error = |key: &str, text| BuildError { key: key.into(), kind: ProblemKind::Conflict(text) };
         let mut errors = Vec::new();
         if self.is_directed() && !self.has_valid_direction() {
             let reason = "is the zero vector; allowed: a vector with at least one nonzero component".to_owned();
-            errors.push(error("direction", reason));
+            errors.push(BuildError { key: "direction".into(), kind: ProblemKind::Conflict(reason) });
         }
         let is_wider = self.inner_cone_deg > self.outer_cone_deg;
         if self.kind == LightKind::Spot && is_wider && is_stated("inner_cone_deg") {
@@ -48,7 +47,7 @@ impl SharedTable for LightParameters {
                 "{} degrees is wider than `outer_cone_deg` ({}); allowed: up to `outer_cone_deg`",
                 self.inner_cone_deg, self.outer_cone_deg
             );
-            errors.push(error("inner_cone_deg", reason));
+            errors.push(BuildError { key: "inner_cone_deg".into(), kind: ProblemKind::Conflict(reason) });
         }
         errors
     }
@@ -73,6 +72,7 @@ impl SharedTable for LightParameters {
 
 fn draw(tables: &[BuiltTable], _context: &BuildContext) -> Arc<dyn Phenomenon> {
     let lights: Vec<LightParameters> = tables.iter().filter_map(BuiltTable::parameters).cloned().collect();
-    let at = move |t| lights.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect();
-    Arc::new(Lamps::new(at))
+    Arc::new(Lamps::new(move |t| {
+        lights.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect()
+    }))
 }

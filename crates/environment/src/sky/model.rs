@@ -1,6 +1,6 @@
 //! The sky of a scene: stars and skyline, which are built once from its parameters.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use bansho_base::{
     camera::Camera,
@@ -45,15 +45,18 @@ impl SkyBackdrop {
     /// The cached night sky of a view; `None` by day.
     pub(super) fn cache(&self, sky: &Sky, view: &View, cameras: &[Camera]) -> Option<SkyCache> {
         sky.night()?;
-        // The lock is never held during parallel work.
-        let cached = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(cache) = cached().as_mut().filter(|cache| cache.matches(cameras, view.size, sky)) {
+        if let Some(cache) = self.lock_cache().as_mut().filter(|cache| cache.matches(cameras, view.size, sky)) {
             cache.enable_row_cache();
             return Some(cache.clone());
         }
+        // Not while the lock is held: this works in parallel.
         let cache = self.night_sky(sky, view, cameras)?;
-        *cached() = Some(cache.clone());
+        *self.lock_cache() = Some(cache.clone());
         Some(cache)
+    }
+
+    fn lock_cache(&self) -> MutexGuard<'_, Option<SkyCache>> {
+        self.cache.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The night sky of a view; `None` by day.

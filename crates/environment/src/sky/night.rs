@@ -54,15 +54,16 @@ impl NightSky {
         let color = color::black_body().radiance(MILKY_WAY_K);
         let scale = milky_way * MILKY_WAY_LUMINANCE / f64::from(color::luminance(color));
         let horizon = observer.horizon_sine();
-        let almucantar = |step: usize| {
+        let mut almucantars = Vec::with_capacity(ELEVATION_STEPS + 1);
+        for step in 0..=ELEVATION_STEPS {
             let root = step as f64 / ELEVATION_STEPS as f64;
             let elevation = math::asin((1.0 - horizon).mul_add(root * root, horizon));
             let dimmed = (scale * night.transmittance(elevation)) as f32;
             let [even, glow, blue] = night.almucantar_of(elevation, observer).terms().map(with_zero);
-            Almucantar { even, glow, blue, milky_way: with_zero(color.map(|value| value * dimmed)) }
-        };
+            almucantars.push(Almucantar { even, glow, blue, milky_way: with_zero(color.map(|value| value * dimmed)) });
+        }
         Self {
-            almucantars: (0..=ELEVATION_STEPS).map(almucantar).collect(),
+            almucantars,
             ground: with_zero(sky.radiance(-DVec3::Y)),
             horizon: horizon as f32,
             per_range: (1.0 / (1.0 - horizon)) as f32,
@@ -105,10 +106,9 @@ impl Almucantar {
     #[inline(always)]
     fn radiance<S: Simd>(&self, simd: S, toward: f32, milky_way_weight: f32) -> [f32; 4] {
         let squared = toward * toward;
-        let lanes = |values: [f32; 4]| FourLanes::simd_from(simd, values);
-        let mut sum = lanes(self.even);
-        sum = lanes(self.blue).fma(sum.broadcast(toward), sum);
-        sum = lanes(self.glow).fma(sum.broadcast(squared * squared), sum);
-        lanes(self.milky_way).fma(sum.broadcast(milky_way_weight), sum).into()
+        let mut sum = FourLanes::simd_from(simd, self.even);
+        sum = FourLanes::simd_from(simd, self.blue).fma(sum.broadcast(toward), sum);
+        sum = FourLanes::simd_from(simd, self.glow).fma(sum.broadcast(squared * squared), sum);
+        FourLanes::simd_from(simd, self.milky_way).fma(sum.broadcast(milky_way_weight), sum).into()
     }
 }

@@ -201,40 +201,49 @@ impl PreparedSky<'_> {
         // Bound on the deviation of the sine from linear interpolation between the corners.
         let angle = LANES as f64 / self.view.camera.focal_pixels;
         let min_sine = f64::from(sine) + angle * angle;
-        let rows = [rect.y, rect.bottom()].map(|y| y as f64);
-        let mut corners = rows.into_iter().flat_map(|y| [x, x + LANES].map(|x| DVec2::new(x as f64, y)));
-        let is_above = |corner: DVec2| {
-            self.cameras
-                .iter()
-                .all(|camera| camera.direction(corner).is_some_and(|toward| toward.y > min_sine * toward.length()))
-        };
-        corners.all(is_above)
+        for y in [rect.y, rect.bottom()] {
+            for x in [x, x + LANES] {
+                let corner = DVec2::new(x as f64, y as f64);
+                let mut directions = self.cameras.iter().map(|camera| camera.direction(corner));
+                if !directions.all(|toward| toward.is_some_and(|toward| toward.y > min_sine * toward.length())) {
+                    return false;
+                }
+            }
+        }
+        true
     }
 }
 
 impl PreparedSky<'_> {
     /// The rows that may show the edge of the hills, in any lens.
     fn skyline_rows(&self, skyline: &Skyline) -> Rect {
-        /// Side of the squares in which it is looked for, pixels.
-        const SIDE: usize = 16;
         let [width, height] = self.view.size;
         // No lens shows more than 1 / f radians in a pixel. The middle of a square is at most 0.71 of its side from its corners, and edges are a pixel wide.
-        let margin = 0.8 * SIDE as f64 / self.view.camera.focal_pixels;
-        let elevations = f64::from(skyline.lowest) - margin..f64::from(skyline.highest) + margin;
-        let is_edge = |row: &usize| {
-            (0..width.div_ceil(SIDE)).any(|column| {
-                let middle = [column, *row].map(|index| (index * SIDE + SIDE / 2) as f64);
-                let directions = self.cameras.iter().filter_map(|camera| camera.direction(DVec2::from(middle)));
-                directions.map(|toward| toward.y / toward.length()).any(|sine| elevations.contains(&sine))
-            })
-        };
-        let rows = height.div_ceil(SIDE);
-        let Some(first) = (0..rows).find(is_edge) else { return Rect::default() };
-        let last = (first..rows).rfind(is_edge).unwrap_or(first);
-        let (y, bottom) = (first * SIDE, ((last + 1) * SIDE).min(height));
+        let margin = 0.8 * SQUARE_SIDE as f64 / self.view.camera.focal_pixels;
+        let sines = f64::from(skyline.lowest) - margin..f64::from(skyline.highest) + margin;
+        let mut rows_of_squares = (0..height.div_ceil(SQUARE_SIDE)).filter(|&row| self.has_square_within(row, &sines));
+        let Some(first) = rows_of_squares.next() else { return Rect::default() };
+        let last = rows_of_squares.next_back().unwrap_or(first);
+        let (y, bottom) = (first * SQUARE_SIDE, ((last + 1) * SQUARE_SIDE).min(height));
         Rect { x: 0, y, width, height: bottom - y }
     }
+
+    /// Whether the middle of any square of a row of squares has an elevation whose sine is within a range, in any of the poses of the camera.
+    fn has_square_within(&self, row: usize, sines: &Range<f64>) -> bool {
+        for column in 0..self.view.size[0].div_ceil(SQUARE_SIDE) {
+            let middle = [column, row].map(|index| (index * SQUARE_SIDE + SQUARE_SIDE / 2) as f64);
+            for toward in self.cameras.iter().filter_map(|camera| camera.direction(DVec2::from(middle))) {
+                if sines.contains(&(toward.y / toward.length())) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
 }
+
+/// Side of the squares in which the edge of the hills is looked for, pixels.
+const SQUARE_SIDE: usize = 16;
 
 /// Coverage of pixels from `x` on in row `y` by the hills, for one camera.
 #[inline(always)]

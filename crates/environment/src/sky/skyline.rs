@@ -67,9 +67,10 @@ fn hill_height(key: Key, sample: usize) -> f64 {
         let waves = FIRST_WAVES << octave;
         let at = position * waves as f64;
         let (cell, fraction) = (at as u64, at - at.floor());
-        let value = |cell: u64| f64::from(key.uniforms(cell % waves, octave, HILL)[0]);
+        // Cells repeat after all of the horizon.
+        let [value, next_value] = [cell, cell + 1].map(|cell| f64::from(key.uniforms(cell % waves, octave, HILL)[0]));
         let blend = fraction * fraction * (3.0 - 2.0 * fraction);
-        sum += math::lerp(value(cell), value(cell + 1), blend) * math::pow(0.45, f64::from(octave));
+        sum += math::lerp(value, next_value, blend) * math::pow(0.45, f64::from(octave));
     }
     sum * 0.55
 }

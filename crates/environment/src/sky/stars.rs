@@ -88,10 +88,8 @@ impl Stars {
         let scale = brightness / psf_integral() / cameras.len() as f64;
         let mut star_images = Vec::new();
         for camera in &cameras {
-            let image = |star: &Star| image(star, camera, view.size, night, horizon, scale);
-            star_images.par_extend(
-                self.0.par_iter().filter_map(image).flat_map_iter(|image| wrapped_images(image, camera, view.size)),
-            );
+            let images = self.0.par_iter().filter_map(|star| image(star, camera, view.size, night, horizon, scale));
+            star_images.par_extend(images.flat_map_iter(|image| wrapped_images(image, camera, view.size)));
         }
         star_images.sort_by(|a, b| a.pixel.y.total_cmp(&b.pixel.y));
         star_images
@@ -102,8 +100,10 @@ impl Stars {
 fn wrapped_images(image: StarImage, camera: &Camera, size: [usize; 2]) -> impl Iterator<Item = StarImage> {
     let turn = std::f64::consts::TAU * camera.focal_pixels;
     let turns: &[f64] = if camera.lens == Lens::Panorama { &[0.0, -1.0, 1.0] } else { &[0.0] };
-    let image = move |turns: &f64| StarImage { pixel: image.pixel + DVec2::new(turns * turn, 0.0), ..image };
-    turns.iter().map(image).filter(move |image| image.is_inside(size))
+    turns
+        .iter()
+        .map(move |turns| StarImage { pixel: image.pixel + DVec2::new(turns * turn, 0.0), ..image })
+        .filter(move |image| image.is_inside(size))
 }
 
 /// Logarithm (base 10) of the number of stars brighter than a magnitude.
@@ -175,16 +175,22 @@ fn image(
 
 /// Whether a position is within `radius` pixels of a picture of `size` pixels.
 fn is_near(pixel: DVec2, radius: f64, size: [usize; 2]) -> bool {
-    let inside = |position: f64, side: usize| position > -radius && position < side as f64 + radius;
-    inside(pixel.x, size[0]) && inside(pixel.y, size[1])
+    let [width, height] = size.map(|side| side as f64);
+    pixel.x > -radius && pixel.x < width + radius && pixel.y > -radius && pixel.y < height + radius
 }
 
-/// Solid angle of a pixel.
+/// The unit vector toward what the camera shows at a pixel.
+fn line_of_sight(camera: &Camera, pixel: DVec2) -> Option<DVec3> {
+    camera.direction(pixel).map(DVec3::normalize)
+}
+
+/// Solid angle of a pixel. At the edge of a dome, half a pixel to the left or up stands for half a pixel to the right or down.
 fn solid_angle(camera: &Camera, pixel: DVec2) -> Option<f64> {
-    let at = |x: f64, y: f64| camera.direction(pixel + DVec2::new(x, y)).map(DVec3::normalize);
-    let (middle, right, down) = (at(0.0, 0.0)?, at(0.5, 0.0), at(0.0, 0.5));
-    let (across, along) = (right.or(at(-0.5, 0.0))? - middle, down.or(at(0.0, -0.5))? - middle);
-    Some((4.0 * across.cross(along).length()).max(1e-18))
+    let (half_right, half_down) = (DVec2::new(0.5, 0.0), DVec2::new(0.0, 0.5));
+    let middle = line_of_sight(camera, pixel)?;
+    let beside = line_of_sight(camera, pixel + half_right).or_else(|| line_of_sight(camera, pixel - half_right))?;
+    let below = line_of_sight(camera, pixel + half_down).or_else(|| line_of_sight(camera, pixel - half_down))?;
+    Some((4.0 * (beside - middle).cross(below - middle).length()).max(1e-18))
 }
 
 /// Largest width of a star's image, pixels.

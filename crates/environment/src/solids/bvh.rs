@@ -76,21 +76,33 @@ impl Triangle {
 fn triangles(mesh: &Mesh) -> Vec<Triangle> {
     let corners: Vec<[DVec3; 3]> = mesh.triangles().collect();
     let area_normals: Vec<DVec3> = corners.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect();
-    let key = |corner: DVec3| corner.to_array().map(f64::to_bits);
+    // The triangles around each corner.
     let mut around: BTreeMap<[u64; 3], Vec<usize>> = BTreeMap::new();
     for (index, corners) in corners.iter().enumerate() {
-        corners.iter().for_each(|corner| around.entry(key(*corner)).or_default().push(index));
+        corners.iter().for_each(|corner| around.entry(position_bits(*corner)).or_default().push(index));
     }
-    let triangle = |(index, [a, b, c]): (usize, &[DVec3; 3])| {
-        let own = area_normals[index].normalize_or(DVec3::Y);
-        let normal = |corner: DVec3| {
-            let others = around.get(&key(corner)).into_iter().flatten().map(|other| area_normals[*other]);
-            let smooth = others.filter(|other| other.normalize_or(DVec3::ZERO).dot(own) > CREASE_COS);
-            smooth.sum::<DVec3>().normalize_or(own)
-        };
-        Triangle { corner: *a, edges: [*b - *a, *c - *a], normals: [normal(*a), normal(*b), normal(*c)] }
-    };
-    corners.iter().enumerate().map(triangle).collect()
+    let mut triangles = Vec::with_capacity(corners.len());
+    for (corners, area_normal) in corners.iter().zip(&area_normals) {
+        let own_normal = area_normal.normalize_or(DVec3::Y);
+        let normals = corners.map(|corner| {
+            let others = around.get(&position_bits(corner)).into_iter().flatten().map(|other| area_normals[*other]);
+            let smooth = others.filter(|other| other.normalize_or(DVec3::ZERO).dot(own_normal) > CREASE_COS);
+            smooth.sum::<DVec3>().normalize_or(own_normal)
+        });
+        let [a, b, c] = *corners;
+        triangles.push(Triangle { corner: a, edges: [b - a, c - a], normals });
+    }
+    triangles
+}
+
+/// The bits of a position, by which equal corners are found.
+fn position_bits(position: DVec3) -> [u64; 3] {
+    position.to_array().map(f64::to_bits)
+}
+
+/// The box around boxes, each its minimum and maximum corner.
+fn bounding_box(boxes: impl Iterator<Item = [DVec3; 2]>) -> [DVec3; 2] {
+    boxes.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |all, one| [all[0].min(one[0]), all[1].max(one[1])])
 }
 
 impl TriangleBvh {
@@ -103,16 +115,14 @@ impl TriangleBvh {
     /// Adds the node of the triangles from `first` to `end`, and those below it.
     fn split(&mut self, first: usize, end: usize) {
         let inside = &mut self.triangles[first..end];
-        let bounds = |items: &mut dyn Iterator<Item = [DVec3; 2]>| {
-            items.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |all, one| [all[0].min(one[0]), all[1].max(one[1])])
-        };
-        let [low, high] = bounds(&mut inside.iter().map(Triangle::bounds));
+        let [low, high] = bounding_box(inside.iter().map(Triangle::bounds));
         let node = self.nodes.len();
         self.nodes.push(Node { low, high, first, count: end - first, axis: 0 });
         if end - first <= LEAF_SIZE {
             return;
         }
-        let [low, high] = bounds(&mut inside.iter().map(|triangle| [triangle.middle(); 2]));
+        // Along the axis on which the middles are farthest apart.
+        let [low, high] = bounding_box(inside.iter().map(|triangle| [triangle.middle(); 2]));
         let axis = (0..3).fold(0, |best, axis| if (high - low)[axis] > (high - low)[best] { axis } else { best });
         let half = (end - first) / 2;
         inside.select_nth_unstable_by(half, |a, b| a.middle()[axis].total_cmp(&b.middle()[axis]));

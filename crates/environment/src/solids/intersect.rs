@@ -42,8 +42,13 @@ pub(super) fn sphere(ray: &Ray, radius: f64, limits: [f64; 2]) -> Option<Hit> {
         return None;
     }
     let root = math::sqrt(discriminant);
-    let end = |t: f64| (t, ray.at(t) / radius);
-    first_end([end((-b - root) / a), end((-b + root) / a)], limits)
+    let ends = [(-b - root) / a, (-b + root) / a].map(|t| (t, ray.at(t) / radius));
+    first_end(ends, limits)
+}
+
+/// The part of a vector across the axis of an upright cylinder.
+fn horizontal(vector: DVec3) -> DVec3 {
+    DVec3::new(vector.x, 0.0, vector.z)
 }
 
 /// A box with these half sides.
@@ -57,8 +62,7 @@ pub(super) fn cuboid(ray: &Ray, half: DVec3, limits: [f64; 2]) -> Option<Hit> {
 
 /// An upright cylinder.
 pub(super) fn cylinder(ray: &Ray, radius: f64, half_height: f64, limits: [f64; 2]) -> Option<Hit> {
-    let flat = |vector: DVec3| DVec3::new(vector.x, 0.0, vector.z);
-    let (origin, direction) = (flat(ray.origin), flat(ray.direction));
+    let (origin, direction) = (horizontal(ray.origin), horizontal(ray.direction));
     let (a, b, c) = (direction.length_squared(), origin.dot(direction), origin.length_squared() - radius * radius);
     let discriminant = b * b - a * c;
     let ends = if a < 1e-300 {
@@ -71,7 +75,7 @@ pub(super) fn cylinder(ray: &Ray, radius: f64, half_height: f64, limits: [f64; 2
         return None;
     } else {
         let root = math::sqrt(discriminant);
-        [(-b - root) / a, (-b + root) / a].map(|t| (t, flat(ray.at(t)) / radius))
+        [(-b - root) / a, (-b + root) / a].map(|t| (t, horizontal(ray.at(t)) / radius))
     };
     first_end(within_slab(ray, DVec3::Y, half_height, ends)?, limits)
 }

@@ -46,11 +46,11 @@ impl Solids {
 
     /// Obstacles that are visible.
     pub fn new(obstacles: Vec<Obstacle>) -> Self {
-        let solid = |obstacle: Obstacle| Solid {
-            triangles: obstacle.mesh().map(|mesh| TriangleBvh::new(&mesh.mesh)),
-            material: Material::new(obstacle.parameters()),
-            obstacle,
-        };
-        Self { solids: obstacles.into_iter().map(solid).collect() }
+        let mut solids = Vec::with_capacity(obstacles.len());
+        for obstacle in obstacles {
+            let triangles = obstacle.mesh().map(|mesh| TriangleBvh::new(&mesh.mesh));
+            solids.push(Solid { triangles, material: Material::new(obstacle.parameters()), obstacle });
+        }
+        Self { solids }
     }
 }

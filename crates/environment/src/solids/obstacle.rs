@@ -88,10 +88,12 @@ impl Obstacle {
 
 impl ObstacleMesh {
     fn new(parameters: &ObstacleParameters, assets: &dyn Assets) -> Result<Self, BuildError> {
-        let error = |kind| BuildError { key: "file".into(), kind };
-        let missing = || ProblemKind::Conflict("an obstacle of shape \"mesh\" needs a `file`".into());
-        let file = parameters.file.as_ref().ok_or_else(|| error(missing()))?;
-        let mesh = assets.mesh(&file.0).map_err(|asset_error| error(ProblemKind::Asset(asset_error)))?;
+        let Some(file) = &parameters.file else {
+            let reason = "an obstacle of shape \"mesh\" needs a `file`".into();
+            return Err(BuildError { key: "file".into(), kind: ProblemKind::Conflict(reason) });
+        };
+        let mesh = assets.mesh(&file.0);
+        let mesh = mesh.map_err(|error| BuildError { key: "file".into(), kind: ProblemKind::Asset(error) })?;
         constructions::count("distance_field");
         Ok(Self { distance: Arc::new(DistanceField::new(&mesh)), mesh })
     }

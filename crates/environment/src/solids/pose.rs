@@ -51,12 +51,15 @@ pub(super) struct SurfacePoint<'a> {
 
 /// The path of each obstacle in the picture during an exposure, pixels, and the pose in the middle.
 fn motions<'a>(solids: &'a Solids, view: &View) -> (Vec<f64>, Pose<'a>) {
-    let at = |t: f64| Pose::new(solids, view, t);
-    let [open, middle, close] = [view.shutter.open, view.shutter.middle(), view.shutter.close].map(at);
+    let times = [view.shutter.open, view.shutter.middle(), view.shutter.close];
+    let [open, middle, close] = times.map(|t| Pose::new(solids, view, t));
+    let mut motions = open.motion_pixels(&close);
     // An obstacle that turns around or shakes may end where it began.
-    let ways = [open.motion_pixels(&close), open.motion_pixels(&middle), middle.motion_pixels(&close)];
-    let motion = |index: usize| ways[0][index].max(ways[1][index] + ways[2][index]);
-    ((0..solids.solids.len()).map(motion).collect(), middle)
+    let halves = open.motion_pixels(&middle).into_iter().zip(middle.motion_pixels(&close));
+    for (motion, (first, second)) in motions.iter_mut().zip(halves) {
+        *motion = motion.max(first + second);
+    }
+    (motions, middle)
 }
 
 /// The poses of an exposure, evenly spaced in time: one if nothing moves in the picture. And which of the obstacles move.
@@ -66,11 +69,13 @@ pub(super) fn poses<'a>(solids: &'a Solids, view: &View) -> (Vec<Pose<'a>>, Vec<
     if !moves.contains(&true) {
         return (vec![middle], moves);
     }
-    let pose = |index: usize| Pose {
-        fraction: Some((index as f64 + 0.5) / MAX_TIME_SAMPLES as f64),
-        ..Pose::new(solids, view, view.shutter.instant(index, MAX_TIME_SAMPLES))
-    };
-    ((0..MAX_TIME_SAMPLES).map(pose).collect(), moves)
+    let mut poses = Vec::with_capacity(MAX_TIME_SAMPLES);
+    for index in 0..MAX_TIME_SAMPLES {
+        let mut pose = Pose::new(solids, view, view.shutter.instant(index, MAX_TIME_SAMPLES));
+        pose.fraction = Some((index as f64 + 0.5) / MAX_TIME_SAMPLES as f64);
+        poses.push(pose);
+    }
+    (poses, moves)
 }
 
 /// The parts of an exposure in which no obstacle moves by much more than a pixel of the picture.
@@ -86,45 +91,31 @@ impl Solids {
         if shutter.duration() <= 0.0 {
             return 0.0;
         }
-        let path = |solid: &Solid| {
-            let placements = shutter.path_times().map(|t| solid.obstacle.placement(t));
-            if placements.iter().all(|placement| *placement == placements[0]) {
-                return 0.0;
-            }
-            let corners = placements.map(|placement| solid.corners(&placement));
-            let of_corner =
-                |index: usize| corners.windows(2).map(|pair| (pair[1][index] - pair[0][index]).length()).sum::<f64>();
-            (0..8).map(of_corner).fold(0.0, f64::max)
-        };
-        self.solids.iter().map(path).fold(0.0, f64::max)
+        self.solids.iter().map(|solid| solid.longest_path(shutter)).fold(0.0, f64::max)
     }
 }
 
 impl<'a> Pose<'a> {
     pub(super) fn new(solids: &'a Solids, view: &View, t: f64) -> Self {
-        let placed = |solid: &'a Solid| {
-            let (placement, bounds) = (solid.obstacle.placement(t), solid.obstacle.at(t).bounding_sphere());
-            let (center, radius) = bounds.unwrap_or((placement.position, f64::INFINITY));
-            PlacedSolid { solid, placement, center, radius }
-        };
-        let solids = solids.solids.iter().map(placed).collect();
+        let solids = solids.solids.iter().map(|solid| PlacedSolid::new(solid, t)).collect();
         Self { camera: view.camera_at(t), fraction: None, solids, mirror: view.mirror }
     }
 
     /// Largest motion of each obstacle in the picture from this pose to another one, pixels.
     fn motion_pixels(&self, other: &Self) -> Vec<f64> {
-        let pairs = self.solids.iter().zip(&other.solids);
-        let motion = |(before, after): (&PlacedSolid, &PlacedSolid)| {
-            let ends = before.corners().into_iter().zip(after.corners());
-            let each = ends.map(|(before, after)| {
+        let mut motions = Vec::with_capacity(self.solids.len());
+        for (before, after) in self.solids.iter().zip(&other.solids) {
+            let mut largest = 0.0_f64;
+            for (before, after) in before.corners().into_iter().zip(after.corners()) {
                 let pair = self.camera.project_beyond_circle(before).zip(other.camera.project_beyond_circle(after));
-                pair.map_or(MIN_MOTION_PIXELS, |(a, b)| {
+                // A corner that a camera cannot project is taken to move.
+                largest = largest.max(pair.map_or(MIN_MOTION_PIXELS, |(a, b)| {
                     (a.pixel - other.camera.nearest_repetition(b.pixel, a.pixel)).length()
-                })
-            });
-            each.fold(0.0, f64::max)
-        };
-        pairs.map(motion).collect()
+                }));
+            }
+            motions.push(largest);
+        }
+        motions
     }
 
     /// Nearest and farthest depth of each obstacle in front of the camera, m.
@@ -140,33 +131,7 @@ impl<'a> Pose<'a> {
     /// Corners of the rectangle of the picture that each obstacle may cover, pixels; all of it if a part of the obstacle is beside or behind a perspective
     /// camera. Through other lenses, where edges are curved, that of the sphere that contains it.
     pub(super) fn bounds(&self) -> Vec<[DVec2; 2]> {
-        const ALL: [DVec2; 2] = [DVec2::NEG_INFINITY, DVec2::INFINITY];
-        const NONE: [DVec2; 2] = [DVec2::INFINITY, DVec2::NEG_INFINITY];
-        let bounds = |placed: &PlacedSolid| {
-            if self.camera.depth(placed.center) < -placed.radius {
-                return NONE;
-            }
-            let mut bounds = NONE;
-            if self.camera.lens != Lens::Perspective {
-                let to_center = placed.center - self.camera.position;
-                let sine = placed.radius / to_center.length();
-                let direction = AngularDistance::new(&self.camera, to_center.normalize_or_zero());
-                let (Some(direction), true) = (direction, sine < 1.0) else { return ALL };
-                for rect in direction.rects_within(math::asin(sine), self.camera.size.map(|side| side.ceil() as usize))
-                {
-                    let corners = [[rect.x, rect.y], [rect.right(), rect.bottom()]];
-                    let [low, high] = corners.map(|corner| DVec2::from(corner.map(|side| side as f64)));
-                    bounds = [bounds[0].min(low), bounds[1].max(high)];
-                }
-                return bounds;
-            }
-            for corner in placed.corners() {
-                let Some(projection) = self.camera.project(corner) else { return ALL };
-                bounds = [bounds[0].min(projection.pixel - 1.0), bounds[1].max(projection.pixel + 1.0)];
-            }
-            bounds
-        };
-        self.solids.iter().map(bounds).collect()
+        self.solids.iter().map(|placed| placed.bounds(&self.camera)).collect()
     }
 
     /// The first surface that a ray meets between two distances.
@@ -207,6 +172,21 @@ impl<'a> Pose<'a> {
 }
 
 impl Solid {
+    /// Length of the longest path of a corner while the shutter is open, m.
+    fn longest_path(&self, shutter: Shutter) -> f64 {
+        let placements = shutter.path_times().map(|t| self.obstacle.placement(t));
+        if placements.iter().all(|placement| *placement == placements[0]) {
+            return 0.0;
+        }
+        let corners = placements.map(|placement| self.corners(&placement));
+        let mut longest = 0.0_f64;
+        for index in 0..8 {
+            let steps = corners.windows(2).map(|pair| (pair[1][index] - pair[0][index]).length());
+            longest = longest.max(steps.sum::<f64>());
+        }
+        longest
+    }
+
     /// Corners of its bounding box at a placement.
     fn corners(&self, placement: &Transform) -> [DVec3; 8] {
         let parameters = self.obstacle.parameters();
@@ -223,13 +203,49 @@ impl Solid {
             }
         };
         std::array::from_fn(|index| {
-            let pick = |axis: usize| if index >> axis & 1 == 0 { low[axis] } else { high[axis] };
-            placement.point_in_world(DVec3::new(pick(0), pick(1), pick(2)))
+            // One bit of the index for each axis.
+            let corner = [0, 1, 2].map(|axis| if index >> axis & 1 == 0 { low[axis] } else { high[axis] });
+            placement.point_in_world(DVec3::from(corner))
         })
     }
 }
 
-impl PlacedSolid<'_> {
+impl<'a> PlacedSolid<'a> {
+    /// An obstacle at time `t`.
+    fn new(solid: &'a Solid, t: f64) -> Self {
+        let (placement, bounds) = (solid.obstacle.placement(t), solid.obstacle.at(t).bounding_sphere());
+        let (center, radius) = bounds.unwrap_or((placement.position, f64::INFINITY));
+        Self { solid, placement, center, radius }
+    }
+
+    /// See [`Pose::bounds`].
+    fn bounds(&self, camera: &Camera) -> [DVec2; 2] {
+        const ALL: [DVec2; 2] = [DVec2::NEG_INFINITY, DVec2::INFINITY];
+        const NONE: [DVec2; 2] = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+        if camera.depth(self.center) < -self.radius {
+            return NONE;
+        }
+        let mut bounds = NONE;
+        if camera.lens != Lens::Perspective {
+            let to_center = self.center - camera.position;
+            let sine = self.radius / to_center.length();
+            let direction = AngularDistance::new(camera, to_center.normalize_or_zero());
+            // Around the camera, it may cover everything.
+            let (Some(direction), true) = (direction, sine < 1.0) else { return ALL };
+            for rect in direction.rects_within(math::asin(sine), camera.size.map(|side| side.ceil() as usize)) {
+                let corners = [[rect.x, rect.y], [rect.right(), rect.bottom()]];
+                let [low, high] = corners.map(|corner| DVec2::from(corner.map(|side| side as f64)));
+                bounds = [bounds[0].min(low), bounds[1].max(high)];
+            }
+            return bounds;
+        }
+        for corner in self.corners() {
+            let Some(projection) = camera.project(corner) else { return ALL };
+            bounds = [bounds[0].min(projection.pixel - 1.0), bounds[1].max(projection.pixel + 1.0)];
+        }
+        bounds
+    }
+
     /// Corners of its bounding box.
     fn corners(&self) -> [DVec3; 8] {
         self.solid.corners(&self.placement)

@@ -4,13 +4,14 @@ use std::f64::consts::PI;
 
 use bansho_base::{
     math::{self, DVec3},
-    phenomenon::surroundings::{IncidentLight, Light, Occluder, Surroundings},
+    phenomenon::surroundings::{IncidentLight, Light, Surroundings},
 };
 
 use super::{
     model::Material,
     pose::{Pose, SurfacePoint},
 };
+use crate::ground::height_of_level_ground;
 
 /// Albedo of the ground for the light that it reflects onto the obstacles: wet asphalt or soil.
 const GROUND_ALBEDO: f64 = 0.07;
@@ -42,11 +43,7 @@ fn fresnel(reflectance: f64, cos: f64) -> f64 {
 
 impl<'a> Shading<'a> {
     pub(super) fn new(surroundings: &'a Surroundings<'a>) -> Self {
-        let level = |solid: &Occluder| match solid {
-            Occluder::HalfSpace { point, normal } if normal.y > 0.999 => Some(point.y),
-            _ => None,
-        };
-        Self { surroundings, ground: surroundings.others.occluders.iter().filter_map(level).max_by(f64::total_cmp) }
+        Self { surroundings, ground: height_of_level_ground(&surroundings.others.occluders) }
     }
 
     /// Whether lights move, so that what they light differs from pose to pose.

@@ -81,14 +81,15 @@ fn bounds(poses: &[Pose], view: &View) -> Vec<Rect> {
     for pose in &poses[1..] {
         all.iter_mut().zip(pose.bounds()).for_each(|(all, one)| *all = [all[0].min(one[0]), all[1].max(one[1])]);
     }
-    let clamp = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-    let rect = |[low, high]: [DVec2; 2]| {
-        let [x, y] = [clamp(low.x.floor(), view.size[0]), clamp(low.y.floor(), view.size[1])];
-        let [right, bottom] = [clamp(high.x.ceil(), view.size[0]), clamp(high.y.ceil(), view.size[1])];
+    let picture = DVec2::from(view.size.map(|side| side as f64));
+    let mut rects = Vec::with_capacity(all.len());
+    for [low, high] in all {
+        let [x, y] = low.floor().clamp(DVec2::ZERO, picture).to_array().map(|edge| edge as usize);
+        let [right, bottom] = high.ceil().clamp(DVec2::ZERO, picture).to_array().map(|edge| edge as usize);
         let rect = Rect { x, y, width: right.saturating_sub(x), height: bottom.saturating_sub(y) };
-        rect.intersection(&view.window)
-    };
-    all.into_iter().map(rect).collect()
+        rects.push(rect.intersection(&view.window));
+    }
+    rects
 }
 
 /// Whether a pixel is in one of some rectangles.
@@ -131,8 +132,9 @@ impl PreparedSolids {
 
 /// The opaque surfaces of the pixels of a rectangle.
 fn opaque_surfaces(rect: Rect, pixels: &[Pixel]) -> OpaqueSurfaces {
-    let filled = |value: f32| Image::filled(rect.width, rect.height, [value]);
-    let mut surfaces = OpaqueSurfaces { rect, depth: filled(f32::INFINITY), coverage: filled(0.0) };
+    let depth = Image::filled(rect.width, rect.height, [f32::INFINITY]);
+    let coverage = Image::filled(rect.width, rect.height, [0.0]);
+    let mut surfaces = OpaqueSurfaces { rect, depth, coverage };
     let images = surfaces.depth.pixels_mut().iter_mut().zip(surfaces.coverage.pixels_mut());
     for ((depth, coverage), pixel) in images.zip(pixels).filter(|(_, pixel)| pixel.coverage > 0.0) {
         *depth = [pixel.opaque_depth];
@@ -283,15 +285,14 @@ impl Tracer<'_> {
 
     /// A pixel by many rays, each at its own time. Where they all meet one smooth surface, it is shaded where the rays `shaded` meet it.
     fn supersampled<const N: usize>(&self, position: DVec2, shaded: &[usize]) -> Pixel {
-        let sample = |index: usize| {
+        let mut samples: [Option<(SurfacePoint, &Pose)>; N] = [None; N];
+        for (index, sample) in samples.iter_mut().enumerate() {
             // The times are in another order than the columns, so that motion does not shear an edge.
             let pose = &self.poses[(index * 7 % N) * self.poses.len() / N];
-            pose.seen(position + sample_offset(index, N)).map(|surface| (surface, pose))
-        };
-        let samples: [Option<(SurfacePoint, &Pose)>; N] = std::array::from_fn(sample);
-        let corner =
-            |sample: &Option<(SurfacePoint, &Pose)>| sample.map(|(surface, _)| (surface.index, surface.normal));
-        let is_one = samples.iter().all(|sample| is_smooth(corner(&samples[0]), corner(sample)))
+            *sample = pose.seen(position + sample_offset(index, N)).map(|surface| (surface, pose));
+        }
+        let corners = samples.map(|sample| sample.map(|(surface, _)| (surface.index, surface.normal)));
+        let is_one = corners.iter().all(|corner| is_smooth(corners[0], *corner))
             && !(self.shading.lights_move() && self.poses.len() > 1);
         let hits = samples.iter().flatten().count();
         if hits == 0 {

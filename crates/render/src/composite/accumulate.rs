@@ -26,6 +26,11 @@ pub(crate) struct Accumulator {
     pub(crate) aovs: Vec<Vec<AovPlane>>,
 }
 
+/// The mean of `own` with a weight and `other` with the rest.
+fn weighted_mean(own: f32, own_weight: f32, other: f32) -> f32 {
+    (own - other).fma(own_weight, other)
+}
+
 fn refill(plane: &mut Vec<f32>, pixels: usize, value: f32) {
     plane.clear();
     plane.resize(pixels, value);
@@ -103,12 +108,12 @@ impl Accumulator {
             if weight <= 0.0 {
                 continue;
             }
-            let mix = |own: &mut f32, other: f32| *own = weight.fma(other - *own, *own);
             for c in 0..3 {
-                mix(&mut self.color[c][to], other.color[c][from]);
+                let color = &mut self.color[c][to];
+                *color = weight.fma(other.color[c][from] - *color, *color);
             }
-            for (own, other) in self.layers.iter_mut().flatten().zip(other.layers.iter().flatten()) {
-                mix(&mut own[to], other[from]);
+            for (plane, other) in self.layers.iter_mut().flatten().zip(other.layers.iter().flatten()) {
+                plane[to] = weight.fma(other[from] - plane[to], plane[to]);
             }
             let [before, without] = [self.transmittance_at(to), other.transmittance_at(from)];
             let absorbed = (0..3).map(|c| before[c] - without[c]).sum::<f32>() / 3.0;
@@ -139,16 +144,15 @@ impl Accumulator {
             if !is_mixed(weight) {
                 continue;
             }
-            let lerp = |own: &mut f32, other: f32| *own = (*own - other).fma(weight, other);
             let transmittance = other.transmittance_at(from);
             for c in 0..3 {
-                lerp(&mut self.color[c][to], other.color[c][from]);
+                self.color[c][to] = weighted_mean(self.color[c][to], weight, other.color[c][from]);
                 if self.absorbs {
-                    lerp(&mut self.transmittance[c][to], transmittance[c]);
+                    self.transmittance[c][to] = weighted_mean(self.transmittance[c][to], weight, transmittance[c]);
                 }
             }
-            for (own, other) in self.layers.iter_mut().flatten().zip(other.layers.iter().flatten()) {
-                lerp(&mut own[to], other[from]);
+            for (plane, other) in self.layers.iter_mut().flatten().zip(other.layers.iter().flatten()) {
+                plane[to] = weighted_mean(plane[to], weight, other[from]);
             }
             self.depth[to] = self.depth[to].min(other.depth[from]);
         }

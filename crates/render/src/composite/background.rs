@@ -199,9 +199,14 @@ impl BentPixel {
             return straight;
         }
         let corners = self.corners(width);
-        let at = |corner: usize| if self.hidden >> corner & 1 == 0 { values[corners[corner]] } else { straight };
-        let upper = at(0).blend(at(1), across);
-        upper.blend(at(2).blend(at(3), across), down)
+        let mut around = [straight; 4];
+        for corner in 0..4 {
+            if self.hidden >> corner & 1 == 0 {
+                around[corner] = values[corners[corner]];
+            }
+        }
+        let upper = around[0].blend(around[1], across);
+        upper.blend(around[2].blend(around[3], across), down)
     }
 
     /// Indices of the four pixels.

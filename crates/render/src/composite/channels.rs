@@ -3,7 +3,7 @@
 use bansho_base::{
     frame::{Channel, Precision},
     math::MulAdd,
-    phenomenon::strip::{AovDescriptor, AovRule},
+    phenomenon::strip::AovRule,
 };
 use bansho_scene::PLATE_LAYER;
 
@@ -107,21 +107,26 @@ pub(super) fn channels(composition: &Composition, strips: Vec<Vec<Vec<f32>>>) ->
     channels
 }
 
+/// The channels without values.
 fn channel_names(composition: &Composition) -> Vec<Channel> {
-    let channel = |name: String, precision| Channel { name, precision, values: Vec::new() };
     let mut channels = Vec::new();
     if composition.outputs.layers {
         let plate = composition.plate.color.is_some().then_some(PLATE_LAYER);
         let names = composition.runs.iter().map(|run| run.info().name).chain(plate);
         for name in names {
-            let color = |suffix| channel(format!("{name}.{suffix}"), Precision::Half);
-            channels.extend(["R", "G", "B", "A"].map(color));
+            for suffix in ["R", "G", "B", "A"] {
+                let name = format!("{name}.{suffix}");
+                channels.push(Channel { name, precision: Precision::Half, values: Vec::new() });
+            }
         }
     }
     if composition.outputs.aovs {
         for run in composition.runs {
-            let aov = |aov: &AovDescriptor| channel(format!("{}.{}", run.info().name, aov.name), Precision::Single);
-            channels.extend(run.info().aovs.iter().map(aov));
+            let info = run.info();
+            for aov in info.aovs {
+                let name = format!("{}.{}", info.name, aov.name);
+                channels.push(Channel { name, precision: Precision::Single, values: Vec::new() });
+            }
         }
     }
     channels

@@ -51,6 +51,11 @@ impl Outputs {
         self.layers || self.aovs || self.depth
     }
 
+    /// Whether there are layers or AOVs.
+    pub(crate) fn has_channels(&self) -> bool {
+        self.layers || self.aovs
+    }
+
     /// Absolute radiance without layers and AOVs.
     pub(crate) const RADIANCE: Self = Self { exposure: 1.0, layers: false, aovs: false, depth: false };
 }
@@ -125,14 +130,17 @@ impl<'a> Composition<'a> {
     /// The rectangle of a strip that must be drawn: the bounds of the phenomena, or the whole strip where there is a background or where layers
     /// or AOVs are requested.
     pub(super) fn nonempty_rect(&self, rect: Rect) -> Rect {
-        if self.background.color.is_some() || self.outputs.layers || self.outputs.aovs {
+        if self.background.color.is_some() || self.outputs.has_channels() {
             return rect;
         }
-        let touched = |slice: &Slice| {
-            let each = slice.members.iter().map(|&member| self.prepared[member].bounds(&slice.interval));
-            each.fold(Rect::default(), |all, bounds| all.union(&bounds.intersection(&rect)))
-        };
-        self.slices.iter().map(touched).fold(Rect::default(), |all, rect| all.union(&rect))
+        let mut touched = Rect::default();
+        for slice in self.slices {
+            for &member in &slice.members {
+                let bounds = self.prepared[member].bounds(&slice.interval);
+                touched = touched.union(&bounds.intersection(&rect));
+            }
+        }
+        touched
     }
 
     /// The rectangle of the frame outside of which all pixels are empty, in pixels of the frame.
@@ -172,10 +180,9 @@ impl<'a> Composition<'a> {
         let StripScratch { accumulator, pass, unplated, .. } = scratch;
         self.accumulate_exposure(level, rect, Pass::before_plate(self), pass, accumulator);
         let (Some(hiding), Some(color)) = (self.through, &self.plate.color) else { return };
-        let transparency = |x: usize, y: usize| 1.0 - color.at(x, y)[3];
-        let Some(clear) = transparent_rect(rect, transparency) else { return };
+        let Some(clear) = transparent_rect(rect, color) else { return };
         self.accumulate_exposure(level, clear, Pass::without_plate(hiding), pass, unplated);
-        accumulator.add_through(unplated, transparency);
+        accumulator.add_through(unplated, |x, y| transparency(color, x, y));
     }
 
     /// Draws the slices within `rect` into an accumulator: where several things move, as the mean of the moments of the exposure. AOVs are always those of
@@ -301,10 +308,17 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// The columns of `rect` from the first to the last that are transparent somewhere.
-fn transparent_rect(rect: Rect, transparency: impl Fn(usize, usize) -> f32) -> Option<Rect> {
-    let is_transparent = |x: &usize| (rect.y..rect.bottom()).any(|y| transparency(*x, y) > 0.0);
-    let first = (rect.x..rect.right()).find(is_transparent)?;
-    let last = (first..rect.right()).rfind(is_transparent)?;
+/// Fraction of a pixel of a plate through which one sees what is behind it.
+fn transparency(plate: &Image<4>, x: usize, y: usize) -> f32 {
+    1.0 - plate.at(x, y)[3]
+}
+
+/// The columns of `rect` from the first to the last in which a plate is transparent somewhere.
+fn transparent_rect(rect: Rect, plate: &Image<4>) -> Option<Rect> {
+    let mut transparent =
+        (rect.x..rect.right()).filter(|&x| (rect.y..rect.bottom()).any(|y| transparency(plate, x, y) > 0.0));
+    let first = transparent.next()?;
+    // From the right, so that the columns between are not looked at.
+    let last = transparent.next_back().unwrap_or(first);
     Some(Rect { x: first, width: last + 1 - first, ..rect })
 }

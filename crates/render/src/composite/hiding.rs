@@ -22,8 +22,9 @@ pub(crate) struct HidingDepth {
 impl HidingDepth {
     /// That of the prepared phenomena through the transparency of a plate; `None` where nothing can be seen through it.
     pub(crate) fn through(prepared: &[Box<dyn Prepared + '_>], plate: &PlateFrame, size: [usize; 2]) -> Option<Self> {
-        let is_behind = |each: &dyn Prepared| plate.depth.is_some() || each.plate_role() == PlateRole::Behind;
-        let is_seen = plate.is_transparent && prepared.iter().any(|each| is_behind(each.as_ref()));
+        // With depths, any phenomenon may be behind the plate.
+        let mut behind = prepared.iter().filter(|each| plate.depth.is_some() || each.plate_role() == PlateRole::Behind);
+        let is_seen = plate.is_transparent && behind.next().is_some();
         is_seen.then(|| Self::new(prepared, &PlateFrame::default(), size))
     }
 
@@ -43,9 +44,10 @@ impl HidingDepth {
         for (member, surfaces) in surfaces.enumerate() {
             let Some(surfaces) = surfaces else { continue };
             hiding.opaque.push(member);
-            let nearest = hiding.nearest.get_or_insert_with(|| {
-                let filled = |value: f32| Image::filled(rect.width, rect.height, [value]);
-                OpaqueSurfaces { rect, depth: filled(f32::INFINITY), coverage: filled(0.0) }
+            let nearest = hiding.nearest.get_or_insert_with(|| OpaqueSurfaces {
+                rect,
+                depth: Image::filled(rect.width, rect.height, [f32::INFINITY]),
+                coverage: Image::filled(rect.width, rect.height, [0.0]),
             });
             let from = surfaces.rect;
             combine(&mut nearest.depth, rect, &surfaces.depth, from, f32::min);
@@ -87,8 +89,10 @@ impl HidingDepth {
         if self.nearest.is_none() {
             return edges;
         }
-        let is_partly = |x: usize, y: usize| (0.001..0.999).contains(&self.coverage(x, y));
-        for x in (rect.x..rect.right()).filter(|x| (rect.y..rect.bottom()).any(|y| is_partly(*x, y))) {
+        for x in rect.x..rect.right() {
+            if !(rect.y..rect.bottom()).any(|y| (0.001..0.999).contains(&self.coverage(x, y))) {
+                continue;
+            }
             match edges.last_mut() {
                 Some(edge) if x < edge.right() + EDGE_GAP => edge.width = x + 1 - edge.x,
                 _ => edges.push(Rect { x, width: 1, ..rect }),

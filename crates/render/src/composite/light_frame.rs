@@ -54,10 +54,10 @@ impl FrameMemory {
     /// Takes the memory of a recycled frame of the same size: page faults of new memory cost more than drawing a sparse frame.
     fn new(window: Rect, has_depth: bool, recycled: Option<Frame>) -> Self {
         let (width, height) = (window.width, window.height);
-        let fits = |frame: &Frame| {
-            frame.beauty.width() == width && frame.beauty.height() == height && frame.depth.is_some() == has_depth
-        };
-        if let Some(Frame { beauty, depth, content, .. }) = recycled.filter(fits) {
+        if let Some(Frame { beauty, depth, content, .. }) = recycled
+            && [beauty.width(), beauty.height()] == [width, height]
+            && depth.is_some() == has_depth
+        {
             return Self { beauty, depth, stale: content };
         }
         let depth = has_depth.then(|| vec![f32::INFINITY; width * height]);
@@ -69,13 +69,14 @@ impl FrameMemory {
         let (width, stale) = (self.beauty.width(), self.stale);
         let pixels = strip_rows * width;
         let mut depth = self.depth.iter_mut().flat_map(|depth| depth.chunks_mut(pixels));
-        let strip = |(index, beauty): (usize, _)| {
+        let mut strips = Vec::new();
+        for (index, beauty) in self.beauty.pixels_mut().chunks_mut(pixels).enumerate() {
             let rows = Rect { x: 0, y: index * strip_rows, width, height: strip_rows };
             let stale = stale.intersection(&rows);
             let stale = Rect { y: stale.y.saturating_sub(rows.y), ..stale };
-            FrameStrip { beauty, depth: depth.next().unwrap_or_default(), stale, width }
-        };
-        self.beauty.pixels_mut().chunks_mut(pixels).enumerate().map(strip).collect()
+            strips.push(FrameStrip { beauty, depth: depth.next().unwrap_or_default(), stale, width });
+        }
+        strips
     }
 }
 

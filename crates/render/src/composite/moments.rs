@@ -77,11 +77,11 @@ impl Composition<'_> {
         }
         let opaque = moving.iter().filter(|moving| pass.hiding.is_opaque(moving.member));
         let hiding_parts = opaque.map(|moving| moving.parts.len()).max().unwrap_or(0);
-        let surfaces = |part: usize| {
+        let mut moving_hiding = Vec::with_capacity(hiding_parts);
+        for part in 0..hiding_parts {
             let surfaces = parts.iter().map(|parts| parts[part * parts.len() / hiding_parts].opaque_surfaces());
-            HidingDepth::of_surfaces(surfaces, pass.plate_depth, rect)
-        };
-        let moving_hiding: Vec<HidingDepth> = (0..hiding_parts).map(surfaces).collect();
+            moving_hiding.push(HidingDepth::of_surfaces(surfaces, pass.plate_depth, rect));
+        }
         let hiding: Vec<&HidingDepth> =
             if hiding_parts == 0 { vec![pass.hiding] } else { moving_hiding.iter().collect() };
         let members = CellMembers { count, parts };

@@ -60,20 +60,23 @@ impl<'a> Moments<'a> {
 fn cells(moving: &[Rect], strip: Rect) -> Vec<Cell> {
     let moving: Vec<(usize, Rect)> =
         moving.iter().map(|rect| rect.intersection(&strip)).enumerate().filter(|(_, rect)| !rect.is_empty()).collect();
-    let overlap = |(index, rect): (usize, &(usize, Rect))| {
-        moving[..index].iter().any(|(_, other)| !rect.1.intersection(other).is_empty())
-    };
-    if !moving.iter().enumerate().any(overlap) {
+    let overlap = moving
+        .iter()
+        .enumerate()
+        .any(|(index, (_, rect))| moving[..index].iter().any(|(_, other)| !rect.intersection(other).is_empty()));
+    if !overlap {
         return Vec::new();
     }
-    let edges = |[first, end]: [usize; 2], ends: fn(&Rect) -> [usize; 2]| {
-        let mut edges: Vec<usize> = moving.iter().flat_map(|(_, rect)| ends(rect)).chain([first, end]).collect();
+    // In a cell between two neighboring edges, both ways, the same members move everywhere.
+    let (mut rows, mut columns) = (vec![strip.y, strip.bottom()], vec![strip.x, strip.right()]);
+    for (_, rect) in &moving {
+        rows.extend([rect.y, rect.bottom()]);
+        columns.extend([rect.x, rect.right()]);
+    }
+    for edges in [&mut rows, &mut columns] {
         edges.sort_unstable();
         edges.dedup();
-        edges
-    };
-    let rows = edges([strip.y, strip.bottom()], |rect| [rect.y, rect.bottom()]);
-    let columns = edges([strip.x, strip.right()], |rect| [rect.x, rect.right()]);
+    }
     let mut cells: Vec<Cell> = Vec::new();
     for rows in rows.windows(2) {
         let first = cells.len();
@@ -99,11 +102,13 @@ fn tiles(cell: Cell) -> Vec<Cell> {
         return vec![cell];
     }
     let Cell { rect, moving } = cell;
-    let tile = |index: usize| {
+    let mut tiles = Vec::new();
+    // Tiles are aligned to the picture, so that a crop changes no pixel.
+    for index in rect.x / TILE_COLUMNS..rect.right().div_ceil(TILE_COLUMNS) {
         let tile = Rect { x: index * TILE_COLUMNS, width: TILE_COLUMNS, ..rect };
-        Cell { rect: tile.intersection(&rect), moving: moving.clone() }
-    };
-    (rect.x / TILE_COLUMNS..rect.right().div_ceil(TILE_COLUMNS)).map(tile).collect()
+        tiles.push(Cell { rect: tile.intersection(&rect), moving: moving.clone() });
+    }
+    tiles
 }
 
 /// Scratch memory of one thread.

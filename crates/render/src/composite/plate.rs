@@ -132,15 +132,14 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
 
 /// Exposed ACEScg of a pixel over black, and its coverage, from values multiplied by alpha.
 fn over_black(view: &color::View, encoding: Encoding, alpha: PictureAlpha, [r, g, b, coverage]: [f32; 4]) -> [f32; 4] {
-    let linear = |color: [f32; 3]| to_scene(view, encoding, color);
     let encoded = [r, g, b];
     let [r, g, b] = match alpha {
         // Blended in encoded values over black, or already multiplied in linear light.
         PictureAlpha::Opaque | PictureAlpha::Associated | PictureAlpha::Straight(AlphaConvention::Encoded) => {
-            linear([r, g, b])
+            to_scene(view, encoding, encoded)
         }
         PictureAlpha::Straight(AlphaConvention::Linear) if coverage > 0.0 => {
-            linear([r, g, b].map(|value| value / coverage)).map(|value| value * coverage)
+            to_scene(view, encoding, encoded.map(|value| value / coverage)).map(|value| value * coverage)
         }
         PictureAlpha::Straight(AlphaConvention::Linear) => [0.0; 3],
     };
@@ -167,13 +166,11 @@ fn coverage_of_encoded_alpha(values: [f32; 3], alpha: f32) -> f32 {
     }
     let light = values.map(color::decode_srgb);
     let wanted = values.iter().sum::<f32>() + 3.0 * (1.0 - alpha) * MID_GRAY_ENCODED;
-    let blended = |transmitted: f32| -> f32 {
-        light.iter().map(|light| color::encode_srgb(light + transmitted * MID_GRAY)).sum()
-    };
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..COVERAGE_STEPS {
-        let middle = 0.5 * (low + high);
-        if blended(middle) < wanted { low = middle } else { high = middle }
+        let transmitted = 0.5 * (low + high);
+        let blended: f32 = light.iter().map(|light| color::encode_srgb(light + transmitted * MID_GRAY)).sum();
+        if blended < wanted { low = transmitted } else { high = transmitted }
     }
     1.0 - 0.5 * (low + high)
 }
@@ -191,15 +188,15 @@ fn to_scene(view: &color::View, encoding: Encoding, color: [f32; 3]) -> [f32; 3]
 fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &PlateMapping) -> Image<1> {
     let (values, [width, height]) = (depth.values(), depth.size);
     let per_plate_pixel = [width as f64 / mapping.plate[0] as f64, height as f64 / mapping.plate[1] as f64];
-    let nearest = |axis: usize, pixel| {
-        let position = mapping.plate_position(axis, pixel) * per_plate_pixel[axis];
-        (position as usize).min(depth.size[axis] - 1)
-    };
     let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [f32::INFINITY]);
     image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.iter_mut().enumerate() {
             if mapping.covers(0, x) && mapping.covers(1, y) {
-                let meters = depth.scale.meters_of(values[nearest(1, y) * width + nearest(0, x)]);
+                let [column, row] = [(0, x), (1, y)].map(|(axis, pixel)| {
+                    let position = mapping.plate_position(axis, pixel) * per_plate_pixel[axis];
+                    (position as usize).min(depth.size[axis] - 1)
+                });
+                let meters = depth.scale.meters_of(values[row * width + column]);
                 pixel[0] = depth_of_lens(camera, depth.scale.kind, meters, x, y) as f32;
             }
         }
@@ -209,14 +206,12 @@ fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &PlateMapping) -
 
 /// Depth in the convention of the camera's lens: along the axis for perspective, else the distance.
 fn depth_of_lens(camera: &Camera, kind: DepthKind, meters: f64, x: usize, y: usize) -> f64 {
-    let distance_per_depth = || {
-        let direction = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-        direction.map_or(1.0, |direction| direction.length())
-    };
-    match (camera.lens, kind) {
-        (Lens::Perspective, DepthKind::Distance) => meters / distance_per_depth(),
-        _ => meters,
+    if camera.lens != Lens::Perspective || kind != DepthKind::Distance {
+        return meters;
     }
+    // Its length is the distance of the point at depth 1.
+    let direction = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+    meters / direction.map_or(1.0, |direction| direction.length())
 }
 
 #[cfg(test)]

@@ -56,22 +56,27 @@ const INFERRED_WEIGHT: f64 = 1e-6;
 /// upper half of the plate, and brighter toward the zenith as the overcast sky of CIE S 011.
 fn open_sky(samples: &[ElevationSample]) -> Vec<ElevationSample> {
     let mut upper: Vec<&ElevationSample> = samples[..samples.len().div_ceil(2)].iter().collect();
-    let seen = |sample: &&ElevationSample| color::luminance(sample.radiance);
-    upper.sort_by(|a, b| seen(b).total_cmp(&seen(a)));
+    upper.sort_by(|a, b| color::luminance(b.radiance).total_cmp(&color::luminance(a.radiance)));
     upper.truncate((upper.len() as f64 * SKY_FRACTION).ceil() as usize);
-    let Some(count) = std::num::NonZero::new(upper.len()) else { return Vec::new() };
-    let mean =
-        |of: &dyn Fn(&ElevationSample) -> f64| upper.iter().map(|each| of(each)).sum::<f64>() / count.get() as f64;
-    let radiance = [0, 1, 2].map(|c| mean(&|each| f64::from(each.radiance[c])));
-    let overcast = |sine: f64| 1.0 + 2.0 * sine.max(0.0);
-    let level = mean(&|each| overcast(each.sine));
-    let highest = samples.iter().map(|each| each.sine).fold(-1.0, f64::max);
-    let at = |step: usize| {
+    if upper.is_empty() {
+        return Vec::new();
+    }
+    let count = upper.len() as f64;
+    let radiance = [0, 1, 2].map(|c| upper.iter().map(|sample| f64::from(sample.radiance[c])).sum::<f64>() / count);
+    let level = upper.iter().map(|sample| overcast_gradation(sample.sine)).sum::<f64>() / count;
+    let highest = samples.iter().map(|sample| sample.sine).fold(-1.0, f64::max);
+    let mut inferred = Vec::with_capacity(INFERRED_SAMPLES);
+    for step in 0..INFERRED_SAMPLES {
         let sine = math::lerp(highest, 1.0, (step as f64 + 0.5) / INFERRED_SAMPLES as f64);
-        let radiance = radiance.map(|value| (value * overcast(sine) / level) as f32);
-        ElevationSample { sine, weight: INFERRED_WEIGHT, radiance }
-    };
-    (0..INFERRED_SAMPLES).map(at).collect()
+        let radiance = radiance.map(|value| (value * overcast_gradation(sine) / level) as f32);
+        inferred.push(ElevationSample { sine, weight: INFERRED_WEIGHT, radiance });
+    }
+    inferred
+}
+
+/// Radiance of the CIE Standard Overcast Sky (CIE S 011, sky 16) at the sine of an elevation, relative to the horizon: `1 + 2 sin`.
+fn overcast_gradation(elevation_sine: f64) -> f64 {
+    1.0 + 2.0 * elevation_sine.max(0.0)
 }
 
 /// The light of a pixel, with the sine of its elevation and its solid angle as the weight.

@@ -47,32 +47,38 @@ pub(crate) fn cut(intervals: &[Vec<DepthInterval>], names: &[Option<&str>]) -> V
 
 /// Whether a member of a slice goes on before or behind it: then it is drawn in several slices, which costs more than one.
 fn cuts_an_interval(intervals: &[Vec<DepthInterval>], slice: &Slice) -> bool {
-    let is_cut = |interval: &DepthInterval| {
-        interval.overlaps(&slice.interval) && (interval.near < slice.interval.near || interval.far > slice.interval.far)
-    };
-    slice.members.iter().any(|&member| intervals[member].iter().any(is_cut))
+    let DepthInterval { near, far } = slice.interval;
+    let mut of_members = slice.members.iter().flat_map(|&member| &intervals[member]);
+    of_members.any(|interval| interval.overlaps(&slice.interval) && (interval.near < near || interval.far > far))
 }
 
 /// Sorts the members of a slice by the mean depth of those of their intervals that overlap it.
 ///
 /// Gas, for example, is drawn in layers, each at the middle of its interval, which another phenomenon may have cut.
 fn sort_members(slice: &mut Slice, intervals: &[Vec<DepthInterval>], names: &[Option<&str>]) {
-    /// Depth at which intervals without end are cut off, m: far behind everything.
-    const END: f64 = 1e12;
-    let interval = slice.interval;
-    let depth = |member: usize| {
-        let overlapping = intervals[member].iter().filter(|own| own.overlaps(&interval));
-        let (sum, count) = overlapping
-            .fold((0.0, 0.0), |(sum, count), own| (sum + 0.5 * (own.near.max(-END) + own.far.min(END)), count + 1.0));
-        sum / f64::max(count, 1.0)
-    };
     if slice.members.len() < 2 {
         return;
     }
+    let interval = slice.interval;
     slice.members.sort_by(|&a, &b| match (names[a], names[b]) {
-        (Some(name), Some(other)) => depth(a).total_cmp(&depth(b)).then_with(|| name.cmp(other)),
+        (Some(name), Some(other)) => {
+            let [depth, other_depth] = [a, b].map(|member| mean_depth(&intervals[member], &interval));
+            depth.total_cmp(&other_depth).then_with(|| name.cmp(other))
+        }
         (own, other) => own.is_none().cmp(&other.is_none()).then(a.cmp(&b)),
     });
+}
+
+/// Mean depth of the middles of those `intervals` that overlap a slice, m.
+fn mean_depth(intervals: &[DepthInterval], slice: &DepthInterval) -> f64 {
+    /// Depth at which intervals without end are cut off, m: far behind everything.
+    const END: f64 = 1e12;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for interval in intervals.iter().filter(|interval| interval.overlaps(slice)) {
+        sum += 0.5 * (interval.near.max(-END) + interval.far.min(END));
+        count += 1.0;
+    }
+    sum / f64::max(count, 1.0)
 }
 
 /// An interval of positive length. A sheet that faces the camera has a single depth; its interval becomes the shortest possible.
@@ -80,9 +86,15 @@ fn thickened(interval: &DepthInterval) -> DepthInterval {
     DepthInterval { near: interval.near, far: interval.far.max(interval.near.next_up()) }
 }
 
+/// The phenomena of which an interval overlaps a slice.
 fn members(intervals: &[Vec<DepthInterval>], slice: &DepthInterval) -> Vec<usize> {
-    let fills = |index: &usize| intervals[*index].iter().any(|interval| interval.overlaps(slice));
-    (0..intervals.len()).filter(fills).collect()
+    let mut members = Vec::new();
+    for (index, filled) in intervals.iter().enumerate() {
+        if filled.iter().any(|interval| interval.overlaps(slice)) {
+            members.push(index);
+        }
+    }
+    members
 }
 
 /// Merges touching slices that contain only the same phenomenon, since a phenomenon sorts its own contents.
@@ -96,17 +108,21 @@ fn merge_lone_neighbors(slices: &mut Vec<Slice>) {
     });
 }
 
+/// Thickness of two neighboring slices together, relative to their far end.
+fn relative_thickness(pair: &[Slice]) -> f64 {
+    (pair[1].interval.far - pair[0].interval.near) / pair[1].interval.far.max(1e-9)
+}
+
 /// Merges the thinnest neighbors until no more than `limit` slices are counted.
 fn merge_to_limit(slices: &mut Vec<Slice>, limit: usize, is_counted: impl Fn(&Slice) -> bool) {
     let mut counted: Vec<bool> = slices.iter().map(&is_counted).collect();
     let mut count = counted.iter().filter(|counted| **counted).count();
     while count > limit {
-        let width = |pair: &[Slice]| (pair[1].interval.far - pair[0].interval.near) / pair[1].interval.far.max(1e-9);
         // At least one of them is counted, so that each merger gets nearer to the limit or leaves it as it is with fewer slices.
         let pairs = slices.windows(2).zip(counted.windows(2)).enumerate();
         let thinnest = pairs
             .filter(|(_, (_, counted))| counted[0] || counted[1])
-            .min_by(|(_, (a, _)), (_, (b, _))| width(a).total_cmp(&width(b)))
+            .min_by(|(_, (a, _)), (_, (b, _))| relative_thickness(a).total_cmp(&relative_thickness(b)))
             .map(|(index, _)| index);
         let Some(index) = thinnest else { return };
         let next = slices.remove(index + 1);

@@ -43,36 +43,44 @@ pub(crate) fn draw_strips<P: StripPixels>(
     strips: Vec<P>,
 ) -> Result<Vec<Channel>, Cancelled> {
     let level = bansho_base::math::simd::level();
-    let has_channels = composition.outputs.layers || composition.outputs.aovs;
-    let draw_strip = |(index, mut pixels): (usize, P)| {
-        observer::check(composition.observer)?;
-        let _part = composition.begin_part(None);
-        let strip = composition.strip_rect(index);
-        let drawn = composition.nonempty_rect(strip);
-        composition.scratches.with(|scratch| {
-            let mut buffer = std::mem::take(&mut scratch.light);
-            let light = pixels.light(strip, drawn, &mut buffer);
-            let mut planes = Vec::new();
-            if !drawn.is_empty() {
-                composition.accumulate(level, drawn, scratch);
-                composition.background.trace(drawn, &mut scratch.bent);
-                finish_strip(composition, level, scratch, light);
-                if has_channels {
-                    planes = channel_planes(composition, scratch);
-                }
-            }
-            pixels.convert(strip, drawn, &buffer);
-            scratch.light = buffer;
-            Ok(planes)
-        })
-    };
-    let strips = strips.into_par_iter().enumerate().with_max_len(1).map(draw_strip);
-    if !has_channels {
+    // A strip a task: what takes long to draw is often in few of them.
+    let strips = strips.into_par_iter().enumerate().with_max_len(1);
+    let strips = strips.map(|(index, pixels)| draw_strip(composition, level, index, pixels));
+    if !composition.outputs.has_channels() {
         // Collecting would allocate memory for each strip.
         strips.try_for_each(|planes| planes.map(|_| ()))?;
         return Ok(Vec::new());
     }
     Ok(channels(composition, strips.collect::<Result<_, Cancelled>>()?))
+}
+
+/// Draws and composites the strip with this index, and converts it. Returns the planes of its channels, if there are any.
+fn draw_strip<P: StripPixels>(
+    composition: &Composition,
+    level: Level,
+    index: usize,
+    mut pixels: P,
+) -> Result<Vec<Vec<f32>>, Cancelled> {
+    observer::check(composition.observer)?;
+    let _part = composition.begin_part(None);
+    let strip = composition.strip_rect(index);
+    let drawn = composition.nonempty_rect(strip);
+    composition.scratches.with(|scratch| {
+        let mut buffer = std::mem::take(&mut scratch.light);
+        let light = pixels.light(strip, drawn, &mut buffer);
+        let mut planes = Vec::new();
+        if !drawn.is_empty() {
+            composition.accumulate(level, drawn, scratch);
+            composition.background.trace(drawn, &mut scratch.bent);
+            finish_strip(composition, level, scratch, light);
+            if composition.outputs.has_channels() {
+                planes = channel_planes(composition, scratch);
+            }
+        }
+        pixels.convert(strip, drawn, &buffer);
+        scratch.light = buffer;
+        Ok(planes)
+    })
 }
 
 /// Exposes a strip, computes its alpha, and composites the background behind it.

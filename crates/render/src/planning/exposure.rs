@@ -107,22 +107,30 @@ fn lit_luminances(plan: &Plan, t: f64) -> Vec<f64> {
     let ground = scene.tables.level_ground(t).filter(|_| !scene.has_plate());
     let sky = scene.tables.sky(t).map_or([0.0; 3], |stated| stated.sky.horizontal_illuminance());
     let has_air = scene.instances.iter().any(|instance| instance.enabled);
-    let along = |index: usize| {
+    let mut luminances = Vec::with_capacity(COLUMNS * ROWS);
+    for index in 0..COLUMNS * ROWS {
         let [column, row] = [index % COLUMNS, index / COLUMNS].map(|step| step as f64 + 0.5);
         let pixel = DVec2::new(column / COLUMNS as f64 * camera.size[0], row / ROWS as f64 * camera.size[1]);
-        let Some(line) = camera.direction(pixel).and_then(DVec3::try_normalize) else { return 0.0 };
-        let hit = ground.and_then(|ground| Some((ground, ground_distance(&ground, camera.position, line)?)));
-        let end = hit.map_or(f64::INFINITY, |(_, distance)| distance);
-        let on_ground = hit.map_or(0.0, |(ground, distance)| {
+        let Some(line) = camera.direction(pixel).and_then(DVec3::try_normalize) else {
+            luminances.push(0.0);
+            continue;
+        };
+        let mut end = f64::INFINITY;
+        let mut on_ground = 0.0;
+        if let Some(ground) = &ground
+            && let Some(distance) = ground_distance(ground, camera.position, line)
+        {
+            end = distance;
             let arriving =
                 f64::from(luminance(sky)) + illuminance(&lights, camera.position + line * distance, Some(DVec3::Y));
-            arriving * ground.reflectance / std::f64::consts::PI
-        });
+            // Lambertian.
+            on_ground = arriving * ground.reflectance / std::f64::consts::PI;
+        }
         let distances = AIR_DISTANCES.iter().filter(|distance| has_air && **distance < end);
         let in_air = distances.map(|distance| illuminance(&lights, camera.position + line * *distance, None));
-        on_ground + AIR_FRACTION / (4.0 * std::f64::consts::PI) * in_air.fold(0.0, f64::max)
-    };
-    (0..COLUMNS * ROWS).map(along).collect()
+        luminances.push(on_ground + AIR_FRACTION / (4.0 * std::f64::consts::PI) * in_air.fold(0.0, f64::max));
+    }
+    luminances
 }
 
 /// Distance along a line of sight at which it meets the ground, m.

@@ -37,17 +37,16 @@ fn least_change(compiled: &Arc<CompiledScene>, plan: &Plan) -> Result<i64, Rende
     let candidates = CANDIDATES.min(count);
     let offsets: Vec<i64> = (0..candidates).map(|candidate| candidate * count / candidates).collect();
     let mut shot = Shot::open(compiled.clone(), Arc::new(thumbnail_plan(plan)));
-    let mut difference = |offset: &i64| {
+    let (mut differences, mut sum) = (Vec::with_capacity(offsets.len()), Difference::default());
+    for offset in &offsets {
         let number = frames.start + offset;
-        Ok(Difference::between(&draw_thumbnail(&mut shot, number - 1)?, &draw_thumbnail(&mut shot, number)?))
-    };
-    let differences = offsets.iter().map(&mut difference).collect::<Result<Vec<_>, RenderError>>()?;
-    let sum = differences.iter().fold(Difference::default(), |sum, each| Difference {
-        codes: sum.codes + each.codes,
-        light: sum.light + each.light,
-    });
-    let relative = |each: &Difference| (each.codes * sum.light).max(each.light * sum.codes);
-    let best = offsets.iter().zip(&differences).min_by(|a, b| relative(a.1).total_cmp(&relative(b.1)));
+        let difference =
+            Difference::between(&draw_thumbnail(&mut shot, number - 1)?, &draw_thumbnail(&mut shot, number)?);
+        sum.codes += difference.codes;
+        sum.light += difference.light;
+        differences.push(difference);
+    }
+    let best = offsets.iter().zip(&differences).min_by(|a, b| a.1.relative_to(&sum).total_cmp(&b.1.relative_to(&sum)));
     Ok(best.map_or(0, |(offset, _)| *offset))
 }
 
@@ -63,11 +62,15 @@ struct Difference {
 impl Difference {
     /// Of display codes; their squares are nearly linear light.
     fn between(before: &[f64], after: &[f64]) -> Self {
-        let pairs = || before.iter().zip(after);
         Self {
-            codes: pairs().map(|(a, b)| (a - b).abs()).sum(),
-            light: pairs().map(|(a, b)| (a * a - b * b).abs()).sum(),
+            codes: before.iter().zip(after).map(|(a, b)| (a - b).abs()).sum(),
+            light: before.iter().zip(after).map(|(a, b)| (a * a - b * b).abs()).sum(),
         }
+    }
+
+    /// The larger of its fractions of the two sums over all candidates, times the product of both sums, so that a sum of 0 is no divisor.
+    fn relative_to(&self, sum: &Self) -> f64 {
+        (self.codes * sum.light).max(self.light * sum.codes)
     }
 }
 

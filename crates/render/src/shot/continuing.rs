@@ -14,6 +14,7 @@ use crate::{
     context::ShotContext,
     plan::Plan,
 };
+use bansho_scene::Scene;
 
 /// Duration over which a wind that was edited takes the place of the one before, s.
 const WIND_TRANSITION_S: f64 = 0.25;
@@ -44,14 +45,16 @@ impl Shot {
         let kept: Vec<Option<ActiveRun>> =
             compiled.enabled().iter().map(|built| take_equal_run(&mut old, built)).collect();
         let loop_s = compiled.scene().loop_s;
-        let kept_or_restored = |(built, run): (&BuiltPhenomenon, Option<ActiveRun>)| {
-            run.unwrap_or_else(|| restored_from_namesake(&old, ActiveRun::start(built, loop_s)))
-        };
-        self.runs = compiled.enabled().iter().zip(kept).map(kept_or_restored).collect();
+        for (built, kept) in compiled.enabled().iter().zip(kept) {
+            self.runs.push(match kept {
+                Some(run) => run,
+                None => restored_from_namesake(&old, ActiveRun::start(built, loop_s)),
+            });
+        }
         let has_stepped = self.runs.iter().any(|run| run.steps_taken > 0);
         self.has_earlier_state = has_stepped && (self.has_earlier_state || !is_same_scene);
-        let height = |plan: &Plan| plan.scene.tables.level_ground(0.0).map(|ground| ground.height);
-        if self.context.plan.scene.plate != plan.scene.plate || height(&self.context.plan) != height(&plan) {
+        let former_scene = &self.context.plan.scene;
+        if former_scene.plate != plan.scene.plate || ground_height(former_scene) != ground_height(&plan.scene) {
             self.plates = PlateCache::default();
         }
         let wind = self.wind_after_edit(&compiled);
@@ -86,11 +89,19 @@ impl Shot {
     }
 }
 
+/// Height of the level ground of a scene at time 0, m.
+fn ground_height(scene: &Scene) -> Option<f64> {
+    scene.tables.level_ground(0.0).map(|ground| ground.height)
+}
+
 /// Takes the run of an equal phenomenon, one with the same fingerprint, out of `old`.
 fn take_equal_run(old: &mut [Option<ActiveRun>], built: &BuiltPhenomenon) -> Option<ActiveRun> {
-    let is_equal = |run: &Option<ActiveRun>| run.as_ref().is_some_and(|run| run.built.fingerprint == built.fingerprint);
-    let run = old.iter_mut().find(|run| is_equal(run))?.take()?;
-    Some(ActiveRun { built: built.clone(), ..run })
+    for run in old {
+        if let Some(equal) = run.take_if(|run| run.built.fingerprint == built.fingerprint) {
+            return Some(ActiveRun { built: built.clone(), ..equal });
+        }
+    }
+    None
 }
 
 /// `run`, which is in its initial state, with the state of the run in `old` whose phenomenon has the same name, at the same time. Unchanged

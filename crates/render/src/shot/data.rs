@@ -1,13 +1,8 @@
 //! What a frame contains as data: particles and lights.
 
-use bansho_base::{
-    geometry::point_cloud::PointCloud,
-    host::observer::Unobserved,
-    phenomenon::surroundings::{Light, Publication},
-};
+use bansho_base::{geometry::point_cloud::PointCloud, host::observer::Unobserved, phenomenon::surroundings::Light};
 
 use super::Shot;
-use crate::compiled::ActiveRun;
 
 /// A light with which a phenomenon lights the others.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,10 +41,12 @@ impl Shot {
     /// of an aurora a directional light. Lamps and the sky of the scene are not among them. The phenomena follow each other in the order of the scene.
     pub fn lights(&self) -> Vec<PhenomenonLight> {
         let publications = self.publications(self.context.plan.shutter_at(self.time), &Unobserved);
-        let of_run = |(run, publication): (&ActiveRun, Publication)| {
-            let phenomenon = run.info().name.to_owned();
-            publication.lights.into_iter().map(move |light| PhenomenonLight { phenomenon: phenomenon.clone(), light })
-        };
-        self.runs.iter().zip(publications).flat_map(of_run).collect()
+        let mut lights = Vec::new();
+        for (run, publication) in self.runs.iter().zip(publications) {
+            let name = run.info().name;
+            let of_run = publication.lights.into_iter();
+            lights.extend(of_run.map(|light| PhenomenonLight { phenomenon: name.to_owned(), light }));
+        }
+        lights
     }
 }

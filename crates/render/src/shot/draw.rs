@@ -133,18 +133,26 @@ struct FramePictures<'a> {
     publications: &'a [Publication],
 }
 
+/// The region `window` of a plane whose rows are `width` long.
+fn crop_plane(values: &[f32], width: usize, window: Rect) -> Vec<f32> {
+    let mut cropped = Vec::with_capacity(window.width * window.height);
+    for y in window.y..window.bottom() {
+        cropped.extend_from_slice(&values[y * width + window.x..][..window.width]);
+    }
+    cropped
+}
+
 /// The region `window` of a whole frame.
 fn crop(whole: Frame, window: Rect) -> Option<Frame> {
-    let width = whole.beauty.width();
-    let plane = |values: &[f32]| -> Vec<f32> {
-        let row = |y| values[y * width + window.x..][..window.width].iter().copied();
-        (window.y..window.bottom()).flat_map(row).collect()
-    };
-    let channels = whole.channels.iter().map(|channel| Channel { values: plane(&channel.values), ..channel.clone() });
+    let (width, beauty) = (whole.beauty.width(), whole.beauty.crop(window)?);
+    let mut channels = Vec::with_capacity(whole.channels.len());
+    for channel in whole.channels {
+        channels.push(Channel { values: crop_plane(&channel.values, width, window), ..channel });
+    }
     Some(Frame {
-        beauty: whole.beauty.crop(window)?,
-        depth: whole.depth.as_deref().map(plane),
-        channels: channels.collect(),
+        beauty,
+        depth: whole.depth.map(|depth| crop_plane(&depth, width, window)),
+        channels,
         header: whole.header,
         opaque: whole.opaque,
         metadata: whole.metadata,

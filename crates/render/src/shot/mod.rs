@@ -128,8 +128,10 @@ impl Shot {
     /// Whether a simulation has been stepped beyond a state from which a frame at time `t` (s) is drawn.
     pub fn is_past(&self, t: f64) -> bool {
         let shutter = self.context.plan.shutter_at(t);
-        let lacks_states = |run: &ActiveRun| run.as_stepped().is_some_and(|run| !run.keeps_states_for(shutter));
-        self.runs.iter().any(|run| run.steps_taken > run.steps_until(shutter) || lacks_states(run))
+        self.runs.iter().any(|run| {
+            run.steps_taken > run.steps_until(shutter)
+                || run.as_stepped().is_some_and(|stepped| !stepped.keeps_states_for(shutter))
+        })
     }
 
     /// Number of steps that simulations have to take until the first frame can be drawn.
@@ -224,11 +226,13 @@ impl Shot {
 
     /// What each phenomenon publishes during `shutter`.
     fn publications(&self, shutter: Shutter, observer: &dyn Observer) -> Vec<Publication> {
-        let publish = |run: &ActiveRun| {
-            let _part = begin_preparation(run, false, observer);
-            run.run.publish(shutter)
-        };
-        self.runs.par_iter().map(publish).collect()
+        self.runs
+            .par_iter()
+            .map(|run| {
+                let _part = begin_preparation(run, false, observer);
+                run.run.publish(shutter)
+            })
+            .collect()
     }
 
     /// Prepares the phenomena with the indices `which`, and cuts them into slices, whose members are positions in `which`.
@@ -239,18 +243,21 @@ impl Shot {
         observer: &dyn Observer,
     ) -> Result<PreparedSlices<'a>, RenderError> {
         let PreparationInputs { view, surroundings, parts, is_mirrored } = inputs;
-        let each = || which.par_iter().map(|&index| (&self.runs[index], &surroundings[index], &parts[index]));
-        let intervals: Vec<_> = each()
-            .map(|(run, surroundings, parts)| {
+        let intervals: Vec<_> = which
+            .par_iter()
+            .map(|&index| {
+                let run = &self.runs[index];
                 let _part = begin_preparation(run, is_mirrored, observer);
-                parts.depth_intervals(&*run.run, view, surroundings)
+                parts[index].depth_intervals(&*run.run, view, &surroundings[index])
             })
             .collect();
-        let prepared: Vec<PreparedExposure> = each()
-            .map(|(run, surroundings, parts)| {
+        let prepared: Vec<PreparedExposure> = which
+            .par_iter()
+            .map(|&index| {
+                let run = &self.runs[index];
                 let _part = begin_preparation(run, is_mirrored, observer);
                 let aovs = run.built.phenomenon.info().aovs;
-                exposure_parts::prepare(&*run.run, aovs, view, surroundings, parts, observer)
+                exposure_parts::prepare(&*run.run, aovs, view, &surroundings[index], &parts[index], observer)
             })
             .collect::<Result<_, _>>()?;
         let names = self.table_names(which);
@@ -267,18 +274,15 @@ impl Shot {
         observer: &dyn Observer,
     ) -> Result<(Vec<Box<dyn Prepared + 'a>>, Moments<'a>), RenderError> {
         let PreparationInputs { parts, is_mirrored, .. } = inputs;
-        let moving = |(exposure, &index): (&PreparedExposure, &usize)| {
-            if parts[index].parts.is_empty() { Rect::default() } else { exposure.whole.moving_bounds() }
-        };
-        let rects: Vec<Rect> = prepared.iter().zip(which).map(moving).collect();
-        let is_crossed = |member: usize| {
-            let others = rects.iter().enumerate().filter(|(other, _)| *other != member);
-            others.into_iter().any(|(_, other)| !other.intersection(&rects[member]).is_empty())
-        };
+        let mut rects = Vec::with_capacity(prepared.len());
+        for (exposure, &index) in prepared.iter().zip(which) {
+            let is_still = parts[index].parts.is_empty();
+            rects.push(if is_still { Rect::default() } else { exposure.whole.moving_bounds() });
+        }
         let members = prepared.into_par_iter().enumerate().map(
             |(member, PreparedExposure { whole, parts: mut parts_of_whole })| {
                 let exposure = &parts[which[member]];
-                if exposure.blurs_itself && is_crossed(member) {
+                if exposure.blurs_itself && overlaps_another(&rects, member) {
                     let run = &self.runs[which[member]];
                     let _part = begin_preparation(run, is_mirrored, observer);
                     parts_of_whole = exposure_parts::prepare_parts(&*run.run, exposure, observer)?;
@@ -317,21 +321,20 @@ impl Shot {
             counts[index] = PartCount::of_run(&*self.runs[index].run, view, &surroundings[index]);
         }
         exposure_parts::nest(&mut counts);
-        let parts = |(index, count): (usize, PartCount)| {
-            let surroundings = &surroundings[index];
-            let of_part = |part: &View| {
-                let mut surroundings = surroundings.clone();
-                surroundings.others.shadow_casters = self.shadow_casters(index, part.shutter, publications);
-                if !surroundings.light_parts.is_empty() {
+        let mut parts_of_all = Vec::with_capacity(counts.len());
+        for (index, count) in counts.into_iter().enumerate() {
+            parts_of_all.push(ExposureParts::new(count, view, |part| {
+                let mut of_part = surroundings[index].clone();
+                of_part.others.shadow_casters = self.shadow_casters(index, part.shutter, publications);
+                if !of_part.light_parts.is_empty() {
                     let fraction = (part.shutter.middle() - view.shutter.open) / view.shutter.duration();
-                    surroundings.others.lights = surroundings.lights_at(fraction).to_vec();
-                    surroundings.light_parts = Vec::new();
+                    of_part.others.lights = of_part.lights_at(fraction).to_vec();
+                    of_part.light_parts = Vec::new();
                 }
-                surroundings
-            };
-            ExposureParts::new(count, view, of_part)
-        };
-        counts.into_iter().enumerate().map(parts).collect()
+                of_part
+            }));
+        }
+        parts_of_all
     }
 
     /// The shadow casters around phenomenon `index` during `part` of the exposure.
@@ -359,18 +362,18 @@ impl Shot {
     ) -> Vec<Surroundings<'a>> {
         let parts = self.light_parts(view.shutter, publications);
         let is_still = parts.is_empty() || view.path_cameras().is_still();
-        let of_phenomenon = |index| {
+        let mut surroundings_of_all = Vec::with_capacity(self.runs.len());
+        for index in 0..self.runs.len() {
             let mut surroundings = stepping::surroundings(&self.context, publications, index, view.shutter, mirror);
-            let lights = |(part, publications): &(Shutter, Vec<Publication>)| {
-                stepping::lights(&self.context, publications, index, *part)
-            };
-            surroundings.light_parts = parts.iter().map(lights).collect();
+            for (part, publications) in &parts {
+                surroundings.light_parts.push(stepping::lights(&self.context, publications, index, *part));
+            }
             if !parts.is_empty() && is_still {
                 surroundings.others.lights = lights_of_parts(&surroundings.light_parts);
             }
-            surroundings
-        };
-        (0..self.runs.len()).map(of_phenomenon).collect()
+            surroundings_of_all.push(surroundings);
+        }
+        surroundings_of_all
     }
 
     /// What phenomena publish in each of the equal parts of an exposure in which lights hardly move; none if they stand still.
@@ -378,24 +381,29 @@ impl Shot {
         /// Most lights in the surroundings of all phenomena in all parts, for the memory that they take.
         const MAX_LIGHTS: usize = 1 << 20;
         let scene = stepping::scene_publication(&self.context, shutter);
-        let all = || publications.iter().chain([&scene]);
-        let mut count = all().map(|publication| publication.light_parts).max().unwrap_or(1);
-        let lights = all().map(|publication| publication.lights.len()).sum::<usize>();
+        let (mut count, mut lights) = (scene.light_parts, scene.lights.len());
+        for publication in publications {
+            count = count.max(publication.light_parts);
+            lights += publication.lights.len();
+        }
         while count > 1 && count * lights * self.runs.len() > MAX_LIGHTS {
             count /= 2;
         }
         if count <= 1 {
             return Vec::new();
         }
-        let during = |part: Shutter| {
-            let publish = |(run, whole): (&ActiveRun, &Publication)| {
+        let mut parts = Vec::with_capacity(count);
+        for index in 0..count {
+            let part = shutter.part(index, count);
+            let mut during_part = Vec::with_capacity(self.runs.len());
+            for (run, whole) in self.runs.iter().zip(publications) {
                 // The state of a simulation is that of the whole exposure.
                 let moves = whole.light_parts > 1 && run.stepping.is_none();
-                if moves { run.run.publish(part) } else { whole.clone() }
-            };
-            (part, self.runs.iter().zip(publications).map(publish).collect())
-        };
-        (0..count).map(|index| during(shutter.part(index, count))).collect()
+                during_part.push(if moves { run.run.publish(part) } else { whole.clone() });
+            }
+            parts.push((part, during_part));
+        }
+        parts
     }
 }
 
@@ -409,6 +417,12 @@ struct PreparationInputs<'a> {
     parts: &'a [ExposureParts<'a>],
     /// Whether it is the reflection in a mirror.
     is_mirrored: bool,
+}
+
+/// Whether a rectangle overlaps any of the others.
+fn overlaps_another(rects: &[Rect], index: usize) -> bool {
+    let mut others = rects.iter().enumerate().filter(|(other, _)| *other != index);
+    others.any(|(_, other)| !other.intersection(&rects[index]).is_empty())
 }
 
 /// Begins the preparation of a phenomenon, for the picture or for its reflection.

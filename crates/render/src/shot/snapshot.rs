@@ -51,21 +51,19 @@ fn contents(bytes: &[u8]) -> Result<&[u8], SnapshotError> {
 
 /// Restores `runs`, which must be in their initial states.
 pub(crate) fn read(compiled: &CompiledScene, bytes: &[u8], runs: &mut [ActiveRun]) -> Result<(), RenderError> {
-    let damaged = || RenderError::from(SnapshotError::Damaged);
     let mut rest = contents(bytes)?;
-    let fingerprint: [u8; 32] = take(&mut rest).ok_or_else(damaged)?;
+    let fingerprint: [u8; 32] = take(&mut rest).ok_or(SnapshotError::Damaged)?;
     if fingerprint != compiled.state_fingerprint() {
         return Err(RenderError::ForeignSnapshot);
     }
-    if u64::from_le_bytes(take(&mut rest).ok_or_else(damaged)?) != runs.len() as u64 {
-        return Err(damaged());
+    if take_number(&mut rest)? != runs.len() as u64 {
+        return Err(SnapshotError::Damaged.into());
     }
     runs.iter_mut().try_for_each(|run| read_run(&mut rest, run))
 }
 
 fn read_run(rest: &mut &[u8], run: &mut ActiveRun) -> Result<(), RenderError> {
-    let mut word = || take(rest).map(u64::from_le_bytes).ok_or(SnapshotError::Damaged);
-    let (steps_taken, length) = (word()?, word()?);
+    let (steps_taken, length) = (take_number(rest)?, take_number(rest)?);
     let length = usize::try_from(length).ok().filter(|length| *length <= rest.len()).ok_or(SnapshotError::Damaged)?;
     let (state, after) = rest.split_at(length);
     *rest = after;
@@ -76,6 +74,12 @@ fn read_run(rest: &mut &[u8], run: &mut ActiveRun) -> Result<(), RenderError> {
     Ok(())
 }
 
+/// Takes a number of 64 bits, little-endian, off the front.
+fn take_number(rest: &mut &[u8]) -> Result<u64, SnapshotError> {
+    take(rest).map(u64::from_le_bytes).ok_or(SnapshotError::Damaged)
+}
+
+/// Takes the first `N` bytes off the front; `None` if there are fewer.
 fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, after) = rest.split_first_chunk::<N>()?;
     *rest = after;

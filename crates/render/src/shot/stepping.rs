@@ -104,10 +104,12 @@ fn step(context: &ShotContext, runs: &mut [ActiveRun], index: usize, now: f64, o
 
 /// Time by which the phenomena are behind the states from which `shutter` is drawn, s; 0 once all have been stepped there.
 pub(crate) fn time_behind(runs: &[ActiveRun], shutter: Shutter) -> f64 {
-    let behind = |run: &ActiveRun| {
-        let (stepping, stepped) = (run.stepping?, run.as_stepped()?);
-        (run.steps_taken < run.steps_until(shutter))
-            .then(|| stepped.time_for(shutter) - stepping.time_after(run.steps_taken))
-    };
-    runs.iter().filter_map(behind).fold(0.0, f64::max)
+    let mut longest = 0.0_f64;
+    for run in runs {
+        let (Some(stepping), Some(stepped)) = (run.stepping, run.as_stepped()) else { continue };
+        if run.steps_taken < run.steps_until(shutter) {
+            longest = longest.max(stepped.time_for(shutter) - stepping.time_after(run.steps_taken));
+        }
+    }
+    longest
 }

@@ -180,19 +180,19 @@ pub(crate) fn check(
         && drawn > without_overscan
         && memory::can_allocate(per_pixel.total(without_overscan, without_overscan))
     {
-        let fits = |overscan| {
+        let max = memory::largest_fitting_count(overscan, |overscan| {
             let pixels = pixel_count(plan.size(), overscan);
             memory::can_allocate(per_pixel.total(pixels, pixels))
-        };
-        let max = memory::largest_fitting_count(overscan, fits);
+        });
         let (width, height, gib) = (window.width, window.height, bytes / GIB);
         let message =
             format!("{width} x {height} pixels with this overscan would take {gib:.1} GiB; allowed: up to {max}");
         return Err(scene.error_at("picture.overscan", ProblemKind::Conflict(message)));
     }
     let fixed = fixed_bytes(compiled, plan);
-    let fits = |thousandths| memory::can_allocate(fixed + 0.001 * thousandths as f64 * (bytes - fixed));
-    let thousandths = memory::largest_fitting_count(1000, fits);
+    let thousandths = memory::largest_fitting_count(1000, |thousandths| {
+        memory::can_allocate(fixed + 0.001 * thousandths as f64 * (bytes - fixed))
+    });
     let scale = (0.001 * thousandths as f64).sqrt();
     let size = [window.width, window.height];
     let max_size = size.map(|side| (side as f64 * scale).floor() as usize);
@@ -220,13 +220,14 @@ fn check_without_pixels(scene: &SceneFile, compiled: &CompiledScene, plan: &Plan
     let plate = plate_file_bytes(compiled);
     if plate > 0.5 * fixed {
         let megapixels = (1e-6 * plate / PLATE_FILE_BYTES).ceil() as i64;
-        let fits = |megapixels: i64| memory::can_allocate(fixed - plate + 1e6 * PLATE_FILE_BYTES * megapixels as f64);
+        let max = memory::largest_fitting_count(megapixels, |megapixels| {
+            memory::can_allocate(fixed - plate + 1e6 * PLATE_FILE_BYTES * megapixels as f64)
+        });
         let file = plan.scene().plate.image.as_ref().map_or("", |image| &image.0);
         let message = format!(
-            "{}: its {megapixels} megapixels would take {:.1} GiB; allowed: up to {} megapixels",
+            "{}: its {megapixels} megapixels would take {:.1} GiB; allowed: up to {max} megapixels",
             printable(file),
-            fixed / GIB,
-            memory::largest_fitting_count(megapixels, fits)
+            fixed / GIB
         );
         return Err(scene.error_at("plate.image", ProblemKind::Conflict(message)));
     }

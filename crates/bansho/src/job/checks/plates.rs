@@ -14,45 +14,45 @@ pub(crate) fn check(scene: &SceneFile, compiled: &CompiledScene, numbers: &[i64]
     let plate = &compiled.scene().plate;
     for (key, path) in [("plate.image", &plate.image), ("plate.depth", &plate.depth)] {
         let Some(path) = path.as_ref().filter(|path| path.0.contains('#')) else { continue };
-        let at_key = |message: String| scene.error_at(key, ProblemKind::Conflict(message));
-        let missing = |number: i64| compiled.assets().find(&path.0, number).err();
-        if let Some((first, count, error)) = first_of(numbers, missing) {
-            return Err(at_key(message(&error, first, count, numbers.len(), "have none")));
-        }
-        let layers = plate.layers();
-        let read = |number: i64| {
-            let size = compiled.assets().check_whole(&path.0, number)?;
-            if size.is_some() {
-                return Ok(size);
-            }
-            // Only decoding tells.
-            Ok(Some(match key {
-                "plate.image" => {
-                    let picture = compiled.assets().picture_layers(&path.0, number, &layers)?;
-                    [picture.color.width(), picture.color.height()]
-                }
-                _ => {
-                    let depth = compiled.assets().depth(&path.0, number, plate.depth_layer.as_deref())?;
-                    [depth.values.width(), depth.values.height()]
-                }
-            }))
-        };
-        let sizes: Vec<_> = numbers.iter().map(|&number| (number, read(number))).collect();
-        let damaged = sizes.iter().filter_map(|(number, size)| Some((*number, size.as_ref().err()?)));
-        let count = damaged.clone().count();
-        if let Some((first, error)) = damaged.clone().next() {
-            return Err(at_key(message(error, first, count, numbers.len(), "cannot be read")));
-        }
-        check_sizes(sizes.into_iter().filter_map(|(number, size)| Some((number, size.ok()??)))).map_err(at_key)?;
+        check_files(compiled, key, &path.0, numbers)
+            .map_err(|message| scene.error_at(key, ProblemKind::Conflict(message)))?;
     }
     Ok(())
 }
 
-/// The first of the frames with an error, their number, and the error.
-fn first_of(numbers: &[i64], error: impl Fn(i64) -> Option<AssetError>) -> Option<(i64, usize, AssetError)> {
-    let (first, found) = numbers.iter().find_map(|&number| Some((number, error(number)?)))?;
-    let count = numbers.iter().filter(|number| error(**number).is_some()).count();
-    Some((first, count, found))
+/// Checks the files of the plate at `key`, one for each frame: first that none is missing, which is quickly told.
+fn check_files(compiled: &CompiledScene, key: &str, path: &str, numbers: &[i64]) -> Result<(), String> {
+    let missing = numbers.iter().filter_map(|&number| Some((number, compiled.assets().find(path, number).err()?)));
+    let missing: Vec<(i64, AssetError)> = missing.collect();
+    if let Some((first, error)) = missing.first() {
+        return Err(message(error, *first, missing.len(), numbers.len(), "have none"));
+    }
+    let (mut sizes, mut damaged) = (Vec::new(), Vec::new());
+    for &number in numbers {
+        match plate_size(compiled, key, path, number) {
+            Ok(size) => sizes.push((number, size)),
+            Err(error) => damaged.push((number, error)),
+        }
+    }
+    if let Some((first, error)) = damaged.first() {
+        return Err(message(error, *first, damaged.len(), numbers.len(), "cannot be read"));
+    }
+    check_sizes(sizes.into_iter())
+}
+
+/// Width and height of the plate at `key` in frame `number`, pixels, if its file is whole.
+fn plate_size(compiled: &CompiledScene, key: &str, path: &str, number: i64) -> Result<[usize; 2], AssetError> {
+    let (assets, plate) = (compiled.assets(), &compiled.scene().plate);
+    if let Some(size) = assets.check_whole(path, number)? {
+        return Ok(size);
+    }
+    // Only decoding tells.
+    if key == "plate.image" {
+        let picture = assets.picture_layers(path, number, &plate.layers())?;
+        return Ok([picture.color.width(), picture.color.height()]);
+    }
+    let depth = assets.depth(path, number, plate.depth_layer.as_deref())?;
+    Ok([depth.values.width(), depth.values.height()])
 }
 
 /// Checks that all frames of a plate have the size of the first: a camera takes all in one.
@@ -66,6 +66,7 @@ fn check_sizes(mut sizes: impl Iterator<Item = (i64, [usize; 2])>) -> Result<(),
     }
 }
 
+/// What is wrong with the plate of the first frame with such a fault, and in how many frames.
 fn message(error: &AssetError, first: i64, count: usize, frames: usize, fault: &str) -> String {
     match count {
         1 => format!("{error}; it is the plate of frame {first}"),

@@ -115,8 +115,8 @@ impl PreparedSimulation {
             finished.record(path.clone());
             observer.frame_done(&FrameDone { number, path: Some(path), drawn: index + 1 });
         }
-        let lost = |&&number: &&i64| !finished.is_present(&self.pattern.path(number));
-        let frames: Vec<i64> = self.frames.iter().filter(lost).copied().collect();
+        let mut frames = self.frames.clone();
+        frames.retain(|&number| !finished.is_present(&self.pattern.path(number)));
         if !frames.is_empty() {
             return Err(JobError::FramesLost { frames, files: self.pattern.template_path() });
         }

@@ -1,6 +1,9 @@
 //! The crop of a flipbook: the part of the picture that is lit in any frame, so that a small flame in a wide picture fills its tiles.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::{
+    ops::Range,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use bansho_base::{
     color::AlphaConvention,
@@ -50,44 +53,44 @@ pub(crate) struct Region {
 impl Region {
     /// The pixels `lit` of a picture of `size`, and one more on each side, which a larger picture may light.
     fn new(lit: &Rect, size: [usize; 2]) -> Self {
-        let ([x, y], [right, bottom]) = ([lit.x, lit.y], [lit.right(), lit.bottom()]);
-        let fraction = |pixel: f64, side: usize| (pixel / side as f64).clamp(0.0, 1.0);
+        let (first, end) = ([lit.x, lit.y], [lit.right(), lit.bottom()]);
         Self {
-            min: [fraction(x as f64 - 1.0, size[0]), fraction(y as f64 - 1.0, size[1])],
-            max: [fraction(right as f64 + 1.0, size[0]), fraction(bottom as f64 + 1.0, size[1])],
+            min: [0, 1].map(|axis| ((first[axis] as f64 - 1.0) / size[axis] as f64).clamp(0.0, 1.0)),
+            max: [0, 1].map(|axis| ((end[axis] as f64 + 1.0) / size[axis] as f64).clamp(0.0, 1.0)),
         }
     }
 
     /// The pixels of a picture of `size` that contain the region and its margin. Width and height are even where the picture is large enough.
     pub(crate) fn pixels(&self, size: [usize; 2]) -> Rect {
-        let side = |axis: usize| {
-            let length = size[axis];
-            let mut start = ((self.min[axis] * length as f64).floor() as usize).saturating_sub(MARGIN);
-            let mut end = ((self.max[axis] * length as f64).ceil() as usize + MARGIN).min(length);
-            if (end - start) % 2 == 1 {
-                if end < length {
-                    end += 1;
-                } else {
-                    start = start.saturating_sub(1);
-                }
+        let [columns, rows] = [0, 1].map(|axis| self.pixels_along(axis, size[axis]));
+        Rect { x: columns.start, y: rows.start, width: columns.len(), height: rows.len() }
+    }
+
+    /// The columns (axis 0) or rows (axis 1) of a picture with `count` of them that contain the region and its margin.
+    fn pixels_along(&self, axis: usize, count: usize) -> Range<usize> {
+        let mut start = ((self.min[axis] * count as f64).floor() as usize).saturating_sub(MARGIN);
+        let mut end = ((self.max[axis] * count as f64).ceil() as usize + MARGIN).min(count);
+        if (end - start) % 2 == 1 {
+            if end < count {
+                end += 1;
+            } else {
+                start = start.saturating_sub(1);
             }
-            (start, end - start)
-        };
-        let ((x, width), (y, height)) = (side(0), side(1));
-        Rect { x, y, width, height }
+        }
+        start..end
     }
 
     /// The size at which a picture of `size` has to be drawn so that the region fits into a tile of `max_tile` pixels; `None` if the tile is too
     /// small.
     pub(crate) fn picture_size(&self, size: [usize; 2], max_tile: [usize; 2]) -> Option<[usize; 2]> {
         // Rounding outward adds a pixel on each side, and an even length one more.
-        let room = |axis: usize| max_tile[axis].checked_sub(2 * MARGIN + 3).filter(|&room| room > 0);
-        let scale = |axis: usize| {
+        const ADDED: usize = 2 * MARGIN + 3;
+        let mut scale = MAX_ENLARGEMENT.min(LARGEST_SIDE / size[0].max(size[1]) as f64);
+        for axis in 0..2 {
+            let room = max_tile[axis].checked_sub(ADDED).filter(|&room| room > 0)?;
             let length = (self.max[axis] - self.min[axis]) * size[axis] as f64;
-            Some(room(axis)? as f64 / length.max(1.0))
-        };
-        let largest = LARGEST_SIDE / size[0].max(size[1]) as f64;
-        let scale = scale(0)?.min(scale(1)?).min(MAX_ENLARGEMENT).min(largest);
+            scale = scale.min(room as f64 / length.max(1.0));
+        }
         Some(size.map(|side| ((side as f64 * scale).round() as usize).max(1)))
     }
 }
@@ -165,8 +168,9 @@ fn bounds(picture: &DisplayImage, min_alpha: u16) -> Rect {
     };
     let mut lit = Rect::default();
     for (y, row) in pixels.chunks_exact(width.max(1)).enumerate() {
-        let is_lit = |pixel: &[u16; 4]| pixel[3] >= min_alpha;
-        if let (Some(first), Some(last)) = (row.iter().position(is_lit), row.iter().rposition(is_lit)) {
+        let mut lit_columns = (0..row.len()).filter(|&x| row[x][3] >= min_alpha);
+        if let Some(first) = lit_columns.next() {
+            let last = lit_columns.next_back().unwrap_or(first);
             lit = lit.union(&Rect { x: first, y, width: last - first + 1, height: 1 });
         }
     }

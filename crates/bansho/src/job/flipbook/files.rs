@@ -225,14 +225,6 @@ impl Files {
 
     fn description(&self, plan: &Plan, sheet: &SheetLayout, drawn: &DrawnFrames, scale: f32) -> Value {
         let fps = plan.fps();
-        let frame = |(index, &number): (usize, &i64)| {
-            let rect = sheet.cell_rect(index);
-            let time_s = index as f64 * fps.frame_s();
-            json!({
-                "number": number, "time_s": time_s, "x": rect.x, "y": rect.y, "width": rect.width, "height": rect.height,
-                "lights": lights::describe(plan, number, &drawn.lights[index]),
-            })
-        };
         let color = match self.is_linear() {
             true => {
                 json!({
@@ -277,7 +269,16 @@ impl Files {
         if self.gltf {
             description["lights"]["file"] = json!(name(&self.path(".gltf")));
         }
-        description["frames"] = drawn.numbers.iter().enumerate().map(frame).collect();
+        let mut frames = Vec::with_capacity(drawn.numbers.len());
+        for (index, &number) in drawn.numbers.iter().enumerate() {
+            let rect = sheet.cell_rect(index);
+            let time_s = index as f64 * fps.frame_s();
+            frames.push(json!({
+                "number": number, "time_s": time_s, "x": rect.x, "y": rect.y, "width": rect.width, "height": rect.height,
+                "lights": lights::describe(plan, number, &drawn.lights[index]),
+            }));
+        }
+        description["frames"] = frames.into();
         description
     }
 

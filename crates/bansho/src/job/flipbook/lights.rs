@@ -12,7 +12,7 @@ use bansho_media::gltf::{self, AnimatedLight, LightKey};
 use bansho_render::{Plan, RenderError, Shot, Target};
 use serde_json::{Value, json};
 
-use crate::job::pipeline::frame_source::FrameSource;
+use crate::job::pipeline::FrameSource;
 
 /// The light of one phenomenon in one frame: all points with which it lights others, as one.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,11 +28,6 @@ pub(crate) struct FlameLight {
 
 /// The lights of the phenomena of a shot that shine as points, at the frame that it was advanced to.
 fn flame_lights(shot: &Shot) -> Vec<FlameLight> {
-    let of_phenomenon = |(name, lights): (String, Vec<Light>)| {
-        let light = Light::merge_points(&lights)?;
-        let Emitter::Point { position, radius } = light.emitter else { return None };
-        Some(FlameLight { phenomenon: name, position, radius, light })
-    };
     let mut groups: Vec<(String, Vec<Light>)> = Vec::new();
     for each in shot.lights() {
         match groups.last_mut() {
@@ -40,7 +35,14 @@ fn flame_lights(shot: &Shot) -> Vec<FlameLight> {
             _ => groups.push((each.phenomenon, vec![each.light])),
         }
     }
-    groups.into_iter().filter_map(of_phenomenon).collect()
+    let mut flames = Vec::new();
+    for (phenomenon, lights) in groups {
+        let Some(light) = Light::merge_points(&lights) else { continue };
+        if let Emitter::Point { position, radius } = light.emitter {
+            flames.push(FlameLight { phenomenon, position, radius, light });
+        }
+    }
+    flames
 }
 
 /// A shot whose lights are recorded as its frames are drawn.
@@ -110,12 +112,14 @@ fn describe_light(
     crop: Rect,
 ) -> Value {
     let srgb = light.srgb();
-    let in_tile =
-        |place: [f64; 2]| [place[0] - crop.x as f64, place[1] - crop.y as f64].map(|value| rounded(value, 100.0));
+    let tile_pixel = camera.project(*position).map(|seen| {
+        let [x, y] = seen.pixel.to_array();
+        [x - crop.x as f64, y - crop.y as f64].map(|value| rounded(value, 100.0))
+    });
     json!({
         "phenomenon": phenomenon,
         "position_m": position.to_array().map(|value| rounded(value, 1e5)),
-        "tile_pixel": camera.project(*position).map(|seen| in_tile(seen.pixel.to_array())),
+        "tile_pixel": tile_pixel,
         "color": srgb.color.map(|value| rounded(value.into(), 1e5)),
         "intensity_cd": significant(srgb.intensity.into()),
         "luminous_intensity_cd": light.luminous_intensity().map(|value| significant(value.into())),
@@ -139,18 +143,22 @@ pub(crate) fn encode_gltf(frames: &[Vec<FlameLight>], frame_s: f64, is_loop: boo
 
 /// The keys of the light of one phenomenon. Where it is dark, the light stays where it was last, and its color.
 fn light_keys(name: &str, frames: &[&Vec<FlameLight>]) -> Vec<LightKey> {
-    let key = |frame: &&Vec<FlameLight>| {
-        let FlameLight { position, light, .. } = frame.iter().find(|light| light.phenomenon == name)?;
-        let SrgbLight { color, intensity } = light.srgb();
-        Some(LightKey { position: position.as_vec3().to_array(), color, intensity })
-    };
-    let keys: Vec<Option<LightKey>> = frames.iter().map(key).collect();
-    let Some(mut last) = keys.iter().copied().flatten().next() else { return Vec::new() };
-    let or_dark = |key: Option<LightKey>| {
-        last = key.unwrap_or(LightKey { intensity: 0.0, ..last });
-        last
-    };
-    keys.into_iter().map(or_dark).collect()
+    let mut lit_keys: Vec<Option<LightKey>> = Vec::with_capacity(frames.len());
+    for frame in frames {
+        let light = frame.iter().find(|light| light.phenomenon == name);
+        lit_keys.push(light.map(|FlameLight { position, light, .. }| {
+            let SrgbLight { color, intensity } = light.srgb();
+            LightKey { position: position.as_vec3().to_array(), color, intensity }
+        }));
+    }
+    // Until it first shines, it is dark where it will be then.
+    let Some(mut last) = lit_keys.iter().copied().flatten().next() else { return Vec::new() };
+    let mut keys = Vec::with_capacity(lit_keys.len());
+    for lit_key in lit_keys {
+        last = lit_key.unwrap_or(LightKey { intensity: 0.0, ..last });
+        keys.push(last);
+    }
+    keys
 }
 
 /// Rounded to a multiple of 1 / `steps`, without a negative zero.

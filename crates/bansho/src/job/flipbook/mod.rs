@@ -166,8 +166,10 @@ impl Flipbook {
 
     fn files(&self, overwrite: OverwritePolicy) -> Result<Files, JobError> {
         let stem = &self.scene.stem;
-        let default = || PathBuf::from("out").join(stem).join(format!("{}.png", naming::literal_pattern(stem)));
-        let path = self.out.clone().unwrap_or_else(default);
+        let path = match &self.out {
+            Some(path) => path.clone(),
+            None => PathBuf::from("out").join(stem).join(format!("{}.png", naming::literal_pattern(stem))),
+        };
         let pattern = OutputPattern::parse(&path, 1)?;
         let is_picture = match pattern.kind() {
             OutputKind::Png | OutputKind::Exr => true,
@@ -212,13 +214,13 @@ impl PreparedFlipbook {
     /// # Errors
     /// The observer canceled the job, or a sheet cannot be written.
     pub fn run(&self, observer: &dyn JobObserver) -> Result<FlipbookSummary, JobError> {
-        let Self { scene, compiled, numbers, files, .. } = self;
+        let Self { compiled, numbers, files, .. } = self;
         observer.started(&JobStarted { frames: numbers.len(), kept: 0, size: self.sheet.cell });
-        let with_position = |error| plates::with_position(scene, error).for_single_file("a flipbook");
-        let (plan, sheet) = &self.cropped(observer).map_err(with_position)?;
+        let (plan, sheet) = &self.cropped(observer).map_err(|error| self.described(error))?;
         let collector = TileCollector::new(sheet.count, observer, |frame, observer| files.tile(frame, observer));
         let mut shot = LightRecorder::new(Shot::open(compiled.clone(), plan.clone()));
-        draw_frames(&mut shot, numbers, &Snapshots::default(), &collector, observer).map_err(with_position)?;
+        draw_frames(&mut shot, numbers, &Snapshots::default(), &collector, observer)
+            .map_err(|error| self.described(error))?;
         let tiles = collector.into_tiles();
         if !tiles.iter().any(Tile::has_motion) {
             observer.warning(&Warning::NoMotion);
@@ -227,23 +229,34 @@ impl PreparedFlipbook {
         files.write(plan, sheet, &drawn, observer).map_err(|error| error.for_single_file("a flipbook"))
     }
 
+    /// An error of drawing, with the position of a plate in the scene.
+    fn described(&self, error: JobError) -> JobError {
+        plates::with_position(&self.scene, error).for_single_file("a flipbook")
+    }
+
+    /// The size of the picture, and the part of it that is drawn, so that `region` fills a tile; `None` if it does not fit, or is the whole picture,
+    /// which is drawn like a flipbook without a crop.
+    fn size_and_crop(&self, region: &crop::Region) -> Option<([usize; 2], Rect)> {
+        let size = if self.size_is_option {
+            self.plan.size()
+        } else {
+            let max_tile = [self.sheet.columns, self.sheet.rows()].map(|tiles| DEFAULT_SHEET_SIDE / tiles);
+            region.picture_size(self.plan.scene().picture.size.map(|side| side as usize), max_tile)?
+        };
+        let crop = region.pixels(size);
+        (crop != Rect::from_size(size[0], size[1])).then_some((size, crop))
+    }
+
     /// The plan and the layout of the cropped flipbook. Finding the lit region draws small pictures of all frames.
     fn cropped(&self, observer: &dyn JobObserver) -> Result<(Arc<Plan>, SheetLayout), JobError> {
-        let uncropped = || Ok((self.plan.clone(), self.sheet));
         if self.crop == FlipbookCrop::None {
-            return uncropped();
+            return Ok((self.plan.clone(), self.sheet));
         }
         let exact = self.files.is_exact();
         let region = crop::lit_region(&self.compiled, &self.plan, &self.numbers, exact, observer)?;
-        let max_tile = [self.sheet.columns, self.sheet.rows()].map(|tiles| DEFAULT_SHEET_SIDE / tiles);
-        let whole = self.plan.scene().picture.size.map(|side| side as usize);
-        let fitting = |region: crop::Region| {
-            let size = if self.size_is_option { self.plan.size() } else { region.picture_size(whole, max_tile)? };
-            let crop = region.pixels(size);
-            // A crop to the whole picture is drawn like a flipbook without a crop.
-            (crop != Rect::from_size(size[0], size[1])).then_some((size, crop))
+        let Some((size, crop)) = region.and_then(|region| self.size_and_crop(&region)) else {
+            return Ok((self.plan.clone(), self.sheet));
         };
-        let Some((size, crop)) = region.and_then(fitting) else { return uncropped() };
         let plan = Arc::new(self.plan.cropped(size, crop)?);
         let layout = SheetLayout { cell: [crop.width, crop.height], ..self.sheet };
         let sheet = sheet::check_layout(layout, SheetKind::Flipbook)?;

@@ -26,17 +26,23 @@ struct MotionAov<'a> {
     layer: [&'a [f32]; 4],
 }
 
+/// The motion AOVs of all phenomena of a frame that have one and a layer.
 fn motion_aovs(frame: &Frame) -> Vec<MotionAov<'_>> {
-    let plane = |name: String| {
-        frame.channels.iter().find(|channel| channel.name == name).map(|channel| channel.values.as_slice())
-    };
-    let of_phenomenon = |name: &str| {
-        let [x, y] = ["motion.X", "motion.Y"].map(|axis| plane(format!("{name}.{axis}")));
-        let [r, g, b, a] = ["R", "G", "B", "A"].map(|channel| plane(format!("{name}.{channel}")));
-        Some(MotionAov { motion: [x?, y?], layer: [r?, g?, b?, a?] })
-    };
-    let names = frame.channels.iter().filter_map(|channel| channel.name.strip_suffix(".motion.X"));
-    names.filter_map(of_phenomenon).collect()
+    let mut aovs = Vec::new();
+    for name in frame.channels.iter().filter_map(|channel| channel.name.strip_suffix(".motion.X")) {
+        let motion = ["motion.X", "motion.Y"].map(|axis| plane(frame, name, axis));
+        let layer = ["R", "G", "B", "A"].map(|channel| plane(frame, name, channel));
+        if let ([Some(x), Some(y)], [Some(r), Some(g), Some(b), Some(a)]) = (motion, layer) {
+            aovs.push(MotionAov { motion: [x, y], layer: [r, g, b, a] });
+        }
+    }
+    aovs
+}
+
+/// The values of a channel of a phenomenon, row by row.
+fn plane<'a>(frame: &'a Frame, phenomenon: &str, channel: &str) -> Option<&'a [f32]> {
+    let name = format!("{phenomenon}.{channel}");
+    Some(frame.channels.iter().find(|channel| channel.name == name)?.values.as_slice())
 }
 
 /// The mean motion at a pixel. The weight of a phenomenon is the sum of its luminance and its alpha.
@@ -65,11 +71,11 @@ const MAX_CODE_OFFSET: u16 = ZERO_CODE - 1;
 
 /// Motion in 16 bits: red to the right, green down, [`ZERO_CODE`] for none.
 pub(crate) fn encode(motion: [f32; 2], scale: f32) -> [u16; 4] {
-    let code = |value: f32| {
+    let [right, down] = motion.map(|value| {
         let steps = (value / scale).clamp(-1.0, 1.0) * f32::from(MAX_CODE_OFFSET);
         (i32::from(ZERO_CODE) + steps.round() as i32) as u16
-    };
-    [code(motion[0]), code(motion[1]), 0, u16::MAX]
+    });
+    [right, down, 0, u16::MAX]
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use bansho_media::output::sink::FinishedPicture;
 use bansho_render::{Target, display::DisplayFrame};
 
 use super::{
-    frame_source::FrameSource,
+    FrameSource,
     in_flight::{CompletionGuard, InFlightFrames, StopOnFailure},
     snapshots::Snapshots,
 };

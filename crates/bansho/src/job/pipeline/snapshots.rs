@@ -9,7 +9,7 @@ use bansho_base::host::observer::{Observer, Stage, StageGuard};
 use bansho_media::files::{atomic, file_identity::resolved, overwrite_policy::OverwritePolicy};
 use bansho_render::{Plan, RenderError};
 
-use super::frame_source::FrameSource;
+use super::FrameSource;
 use crate::job::{
     checks::outputs,
     error::JobError,
@@ -102,9 +102,14 @@ impl Snapshots {
         let Some(folder) = &self.folder else { return Ok(0) };
         let due =
             (self.first_frame..=self.wrapped_frame(last)).step_by(usize::try_from(self.interval).unwrap_or(usize::MAX));
-        // A damaged snapshot is reported by `warm_up`.
-        let is_whole = |path: &Path| read(path).is_ok_and(|bytes| shot.check_snapshot(&bytes).is_ok());
-        let missing: Vec<i64> = due.filter(|number| !is_whole(&self.path(folder, *number))).collect();
+        let mut missing = Vec::new();
+        for number in due {
+            // A damaged snapshot is reported by `warm_up`.
+            let is_whole = read(&self.path(folder, number)).is_ok_and(|bytes| shot.check_snapshot(&bytes).is_ok());
+            if !is_whole {
+                missing.push(number);
+            }
+        }
         let mut reached = None;
         for &number in &missing {
             // From the latest one before it, which may have been written by another job; one that is unusable is replaced.
@@ -214,11 +219,13 @@ fn numbers(folder: &Path) -> io::Result<Vec<i64>> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries?,
     };
-    let number = |entry: io::Result<fs::DirEntry>| {
-        let name = entry.ok()?.file_name();
-        name.to_str()?.strip_prefix("state.")?.strip_suffix(".bansho")?.parse().ok()
-    };
-    Ok(entries.filter_map(number).collect())
+    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    Ok(names.filter_map(|name| frame_of_snapshot(&name)).collect())
+}
+
+/// The frame in the name of a snapshot.
+fn frame_of_snapshot(name: &str) -> Option<i64> {
+    name.strip_prefix("state.")?.strip_suffix(".bansho")?.parse().ok()
 }
 
 #[cfg(test)]

@@ -61,9 +61,12 @@ fn describe(header: &FrameHeader, phenomena: &[PhenomenonMetadata], picture: &Pa
 }
 
 fn describe_phenomenon(metadata: &PhenomenonMetadata) -> (String, Value) {
-    // A value that is not finite becomes null.
-    let entry = |entry: &MetadataEntry| (entry.name.to_owned(), json!({ "value": entry.value, "unit": entry.unit }));
-    (metadata.phenomenon.clone(), Value::Object(metadata.entries.iter().map(entry).collect()))
+    let mut entries = Map::new();
+    for MetadataEntry { name, unit, value } in &metadata.entries {
+        // A value that is not finite becomes null.
+        entries.insert((*name).to_owned(), json!({ "value": value, "unit": unit }));
+    }
+    (metadata.phenomenon.clone(), Value::Object(entries))
 }
 
 #[cfg(test)]

@@ -8,10 +8,7 @@ pub(crate) mod resume;
 
 use std::{path::PathBuf, sync::atomic::AtomicUsize};
 
-use bansho_base::{
-    frame::Frame,
-    host::observer::{Observer, Stage, StageGuard},
-};
+use bansho_base::host::observer::{Stage, StageGuard};
 use bansho_media::{
     imageops::sprite_sheet::SheetLayout,
     output::sink::{FinishedPicture, FrameSlot},
@@ -108,10 +105,9 @@ impl PreparedJob {
     /// Draws all frames into one picture and writes it.
     fn run_contact_sheet(&self, sheet: &SheetLayout, observer: &dyn JobObserver) -> Result<(), JobError> {
         let sink = self.format.open(&self.plan, self.compiled.has_opaque_plate(), 1, sheet.size(), 1)?;
-        let make_tile = |frame: &mut Frame, observer: &dyn Observer| {
+        let collector = TileCollector::new(sheet.count, observer, |frame, observer| {
             contact_sheet::tile(frame, self.contact_background, &self.format, observer)
-        };
-        let collector = TileCollector::new(sheet.count, observer, make_tile);
+        });
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
         draw_frames(&mut shot, &self.frames, &self.snapshots, &collector, observer)?;
         let _stage = StageGuard::begin(observer, Stage::Write);

@@ -156,12 +156,13 @@ pub fn remarks(scene: &SceneFile, compiled: &Arc<CompiledScene>, plan: &Plan) ->
         return Vec::new();
     }
     let mut positions = Positions::new(plan.scene(), &scene.text);
-    let warning = |(name, remark): (String, Remark)| {
+    let mut warnings = Vec::with_capacity(remarks.len());
+    for (name, remark) in remarks {
         let position = positions.find(&name, remark.key.as_deref());
         let position = position.map(|position| FilePosition { file: scene.name.clone(), position });
-        Warning::Remark { position, name, remark }
-    };
-    remarks.into_iter().map(warning).collect()
+        warnings.push(Warning::Remark { position, name, remark });
+    }
+    warnings
 }
 
 impl Job {

@@ -58,12 +58,12 @@ impl PreparedJob {
         if !self.resume {
             return self.frames.clone();
         }
-        let is_missing = |&&number: &&i64| {
+        let missing = self.frames.par_iter().copied().filter(|&number| {
             // Recorded before they are checked, so that a change in between is noticed at the end.
             self.format.files(&self.format.pattern.path(number)).for_each(|file| finished.record(file));
             !self.is_complete(number)
-        };
-        self.frames.par_iter().filter(is_missing).copied().collect()
+        });
+        missing.collect()
     }
 
     /// Checks that all frames of a sequence exist and are complete. Files with the length and modification time at which they were finished are
@@ -72,13 +72,15 @@ impl PreparedJob {
     /// # Errors
     /// Some frames are missing or incomplete.
     pub(crate) fn check_all_present(&self, finished: &FinishedFiles) -> Result<(), JobError> {
-        let is_lost = |&&number: &&i64| {
+        let lost = self.frames.par_iter().copied().filter(|&number| {
             let mut files = self.format.files(&self.format.pattern.path(number));
             !files.all(|file| finished.is_unchanged(&file)) && !self.is_complete(number)
-        };
-        let frames: Vec<i64> = self.frames.par_iter().filter(is_lost).copied().collect();
-        let lost = || JobError::FramesLost { frames: frames.clone(), files: self.format.pattern.template_path() };
-        if frames.is_empty() { Ok(()) } else { Err(lost()) }
+        });
+        let frames: Vec<i64> = lost.collect();
+        if frames.is_empty() {
+            return Ok(());
+        }
+        Err(JobError::FramesLost { frames, files: self.format.pattern.template_path() })
     }
 
     /// Whether frame `number` of this job exists and is complete, with its metadata if the job writes it.

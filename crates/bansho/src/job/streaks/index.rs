@@ -90,7 +90,6 @@ pub(crate) fn describe(
     entries: &[Entry],
 ) -> Value {
     let bins = SizeBin::around(&streaks.diameters);
-    let rain = |(&rate, sizes): (&f64, &DropSizeDistribution)| describe_rain(rate, sizes, &bins, cube);
     let mut index = json!({
         "format": 1,
         "program": provenance::PROGRAM,
@@ -119,7 +118,8 @@ pub(crate) fn describe(
             "space": "ACEScg",
         });
     }
-    index["rain"] = streaks.rates.iter().zip(distributions).map(rain).collect();
+    let rains = streaks.rates.iter().zip(distributions);
+    index["rain"] = rains.map(|(&rate, sizes)| describe_rain(rate, sizes, &bins, cube)).collect();
     index["bins"] = bins.iter().map(|bin| describe_bin(bin, cube)).collect();
     index["textures"] = entries.iter().map(|entry| entry.description.clone()).collect();
     index
@@ -173,8 +173,7 @@ fn how_to_read(streaks: &Streaks, writer: &TextureWriter) -> Value {
 
 fn describe_rain(rate: f64, sizes: &DropSizeDistribution, bins: &[SizeBin], cube: &StreakCube) -> Value {
     let whole = extinction(sizes, ExtinctionEfficiency::Geometric, DropSizeDistribution::ALL);
-    let within = |range| extinction(sizes, ExtinctionEfficiency::Geometric, range);
-    let in_bins: f64 = bins.iter().map(|bin| within(bin.range_mm)).sum();
+    let in_bins: f64 = bins.iter().map(|bin| extinction(sizes, ExtinctionEfficiency::Geometric, bin.range_mm)).sum();
     let mut description = json!({
         "rate_mm_per_h": rate,
         "drops_per_m3": sizes.count(DropSizeDistribution::ALL),

@@ -1,9 +1,7 @@
 //! The smallest depths of a plate in square tiles, and the traversal of these tiles by a reflected ray: Hi-Z ray marching (Uludag 2014, "Hi-Z
 //! Screen-Space Cone-Traced Reflections"). Where a ray is nearer than the smallest depth in a tile, no sample of it within the tile can be a hit.
 
-use bansho_base::{host::parallel::prelude::*, image::Image};
-
-use super::screen_ray::{ScreenRay, parameter};
+use bansho_base::{host::parallel::prelude::*, image::Image, math::DVec2};
 
 /// Side of a tile, in tiles of the level before; on the first level, in pixels.
 const TILES_PER_SIDE: usize = 4;
@@ -93,10 +91,59 @@ fn smallest_in_tiles(fine: &Image<1>) -> Image<1> {
     coarse
 }
 
+/// A ray in the picture of a perspective camera, where it is straight: its pixel at parameter t is `origin + t * step`, and its depth `depth / (1 - t)`. The
+/// parameter goes from 0 at the mirror to 1 at infinity.
+pub(super) struct ScreenRay {
+    pub(super) origin: DVec2,
+    pub(super) step: DVec2,
+    /// Depth at the origin, m.
+    pub(super) depth: f64,
+}
+
+/// The parameter t of a sample of a ray.
+pub(super) fn parameter(sample: usize, samples: usize) -> f64 {
+    sample as f64 / samples as f64
+}
+
+impl ScreenRay {
+    pub(super) fn pixel(&self, t: f64) -> DVec2 {
+        self.origin + self.step * t
+    }
+
+    pub(super) fn depth(&self, t: f64) -> f64 {
+        self.depth / (1.0 - t)
+    }
+
+    /// The last sample that is in the same tile, of this side in pixels, as sample `first`. Coordinates are monotonic from sample to sample, even
+    /// rounded, so all samples between the two are in the tile.
+    pub(super) fn last_in_tile(&self, side: usize, tile: [usize; 2], first: usize, samples: usize) -> usize {
+        let [columns, rows] = tile.map(|index| [index * side, (index + 1) * side].map(|edge| edge as f64));
+        let exit =
+            exit_parameter(columns, self.origin.x, self.step.x).min(exit_parameter(rows, self.origin.y, self.step.y));
+        let mut last = ((exit * samples as f64) as usize).min(samples - 1);
+        // The exit is rounded too, and the edge itself may be outside.
+        while last > first {
+            let pixel = self.pixel(parameter(last, samples));
+            if (columns[0]..columns[1]).contains(&pixel.x) && (rows[0]..rows[1]).contains(&pixel.y) {
+                break;
+            }
+            last -= 1;
+        }
+        last.max(first)
+    }
+}
+
+/// The parameter at which a coordinate leaves an interval; 1 if it never does.
+fn exit_parameter([lower, upper]: [f64; 2], origin: f64, step: f64) -> f64 {
+    if step == 0.0 {
+        return 1.0;
+    }
+    let edge = if step > 0.0 { upper } else { lower };
+    (edge - origin) / step
+}
+
 #[cfg(test)]
 mod tests {
-    use bansho_base::math::DVec2;
-
     use super::*;
 
     #[test]

@@ -23,7 +23,6 @@ use bansho_base::{
 
 mod depth_pyramid;
 mod ray_march;
-mod screen_ray;
 
 use super::plate::PlateFrame;
 use depth_pyramid::DepthPyramid;
@@ -120,6 +119,12 @@ fn fine_pixels(index: usize, side: usize, count: usize) -> Range<usize> {
     index * side..((index + 1) * side).min(count)
 }
 
+/// Whether a pixel is below the horizon, or so little above it that the mirror may still cover it partly.
+fn may_show_mirror(camera: &Camera, pixel: DVec2) -> bool {
+    let direction = camera.direction(pixel);
+    direction.is_some_and(|direction| -direction.y * camera.focal_pixels > -2.0 * direction.length())
+}
+
 /// The rows of the whole picture of `view` in which a horizontal mirror at `height` may be seen, with a margin for interpolation.
 pub(crate) fn mirror_rows(view: &View, height: f64) -> Range<usize> {
     /// Rows above and below.
@@ -131,13 +136,11 @@ pub(crate) fn mirror_rows(view: &View, height: f64) -> Range<usize> {
     if camera.lens != Lens::Perspective {
         return 0..rows;
     }
-    // A pixel beyond the horizon, which the mirror may still cover partly, is counted too. How far a direction points below the horizon is convex along
-    // a row of a perspective picture: its maximum lies at an end.
-    let is_below = |x: usize, y: usize| {
-        let direction = camera.direction(DVec2::new(x as f64, y as f64 + 0.5));
-        direction.is_some_and(|direction| -direction.y * camera.focal_pixels > -2.0 * direction.length())
-    };
-    let mut seen = (0..rows).filter(|&y| is_below(0, y) || is_below(width, y));
+    // How far a direction points below the horizon is convex along a row of a perspective picture: its maximum lies at an end.
+    let mut seen = (0..rows).filter(|&y| {
+        let middle = y as f64 + 0.5;
+        may_show_mirror(camera, DVec2::new(0.0, middle)) || may_show_mirror(camera, DVec2::new(width as f64, middle))
+    });
     let Some(first) = seen.next() else { return 0..0 };
     let last = seen.next_back().unwrap_or(first);
     first.saturating_sub(MARGIN)..(last + 1 + MARGIN).min(rows)

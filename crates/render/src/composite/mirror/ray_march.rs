@@ -9,10 +9,7 @@ use bansho_base::{
     phenomenon::LevelMirror,
 };
 
-use super::{
-    depth_pyramid::{DepthPyramid, TileTraversal},
-    screen_ray::{ScreenRay, parameter},
-};
+use super::depth_pyramid::{DepthPyramid, ScreenRay, TileTraversal, parameter};
 
 /// Distance between samples of a ray, pixels.
 const STRIDE: f64 = 1.0;
@@ -124,10 +121,12 @@ impl RayMarch<'_> {
     /// The first surface of the plate that a ray from the mirror at pixel `start` meets.
     fn first_hit(&self, start: DVec2, ray: &ReflectedRay) -> Option<Hit> {
         self.depth?;
-        let end = || self.camera.project(ray.origin + ray.direction * FAR_M);
         let length = match &ray.on_screen {
             Some(screen) => screen.step.length(),
-            None => end().map_or(SAMPLE_COUNTS[1] * 0.25, |end| (end.pixel - start).length()),
+            None => {
+                let end = self.camera.project(ray.origin + ray.direction * FAR_M);
+                end.map_or(SAMPLE_COUNTS[1] * 0.25, |end| (end.pixel - start).length())
+            }
         };
         let count = (length / STRIDE).ceil().clamp(SAMPLE_COUNTS[0], SAMPLE_COUNTS[1]) as usize;
         let mut before = self.sample(ray, 0.0)?;
