@@ -54,7 +54,10 @@ fn sliders_of_a_particle_flame_edit_its_parameters() {
 #[test]
 fn the_inspector_shows_parameters_for_a_paper_last_below_a_heading() {
     let mut harness = window("bansho = 2\n[picture]\nsize = [32, 18]\nframes = 2\n[sky]\n[[rain]]\n");
-    let top = |harness: &Harness<'_, Studio>, label: &str| harness.get_by_label(label).rect().top();
+    // A parameter's name and its value have the same label.
+    let top = |harness: &Harness<'_, Studio>, label: &str| {
+        harness.get_all_by_label(label).next().expect("it is shown").rect().top()
+    };
     let heading = top(&harness, PAPER_HEADING);
     assert!(top(&harness, "simplification codes") < heading && top(&harness, "splashes") < heading);
     assert!(top(&harness, "terminal velocity") > heading && top(&harness, "opacity") > heading);
