@@ -69,7 +69,8 @@ impl FrameMemory {
         let (width, stale) = (self.beauty.width(), self.stale);
         let pixels = strip_rows * width;
         let mut depth = self.depth.iter_mut().flat_map(|depth| depth.chunks_mut(pixels));
-        let mut strips = Vec::new();
+        // In one allocation: live effects count them.
+        let mut strips = Vec::with_capacity(self.beauty.height().div_ceil(strip_rows));
         for (index, beauty) in self.beauty.pixels_mut().chunks_mut(pixels).enumerate() {
             let rows = Rect { x: 0, y: index * strip_rows, width, height: strip_rows };
             let stale = stale.intersection(&rows);
