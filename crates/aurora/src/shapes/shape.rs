@@ -2,8 +2,6 @@
 
 use bansho_base::math::DVec2;
 
-use super::line_length;
-
 /// One sheet: control points joined by segments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
@@ -13,6 +11,13 @@ pub struct Sheet {
     pub flux: Vec<f64>,
     /// Factor of the aurora's energy at each control point.
     pub energy: Vec<f64>,
+}
+
+impl Sheet {
+    /// Length along its control points, km.
+    fn length(&self) -> f64 {
+        self.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
+    }
 }
 
 impl AsRef<[DVec2]> for Sheet {
@@ -31,7 +36,7 @@ pub struct Shape {
 impl Shape {
     /// Length of all sheets together, km.
     pub fn length(&self) -> f64 {
-        self.sheets.iter().map(|sheet| line_length(&sheet.points)).sum()
+        self.sheets.iter().map(Sheet::length).sum()
     }
 }
 
