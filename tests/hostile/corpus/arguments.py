@@ -91,7 +91,7 @@ def _words() -> list[Case]:
         _render("an unknown option", ["--frmes", "1"], places=["--frames"]),
         _render("an option of 100,000 letters", ["--" + "a" * 100_000], words=""),
         _render("an option that is no UTF-8", [b"--\xff".decode("utf-8", "surrogateescape")], words=""),
-        _render("an unknown view", ["--view", "filmic"], places=["display, standard, raw"]),
+        _render("an unknown view", ["--view", "filmic"], places=["display, agx, standard, raw"]),
         _render("12 bits", ["--bits", "12"], places=["8, 16"]),
         _render("layers in a PNG", ["--layers"], words=r"--layers.*\.exr"),
         _render("encoded alpha of raw pixels", ["--view", "raw", "--alpha", "encoded"], words="--alpha"),
