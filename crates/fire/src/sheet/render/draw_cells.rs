@@ -130,41 +130,107 @@ impl CellSums {
 struct CellBox {
     /// Pixel from which the center counts, itself counted from the corner of the sums.
     pixel: [isize; 2],
-    /// Center, pixels.
-    center: [f32; 2],
-    /// Half of its sides, pixels.
-    half: [f32; 2],
+    /// Low sides, pixels.
+    low: [f32; 2],
+    /// High sides, pixels.
+    high: [f32; 2],
+    /// 1 over its sides, 1/pixel.
+    inverse: [f32; 2],
     /// Area, pixels.
     area: f32,
     depth: f32,
 }
 
 impl CellBox {
-    /// The box of a cell whose sides are the vectors `across` and `up`.
-    #[inline(always)]
-    fn new(center: &Projected, place: Place, across: [f32; 2], up: [f32; 2]) -> Self {
-        const MIN_HALF: f32 = 1e-6;
-        let area = (across[0] * up[1] - across[1] * up[0]).abs();
-        let (width, height) = (across[0].abs() + up[0].abs(), across[1].abs() + up[1].abs());
-        // A parallelogram fills its bounds only if its sides are those of the picture; the box is smaller by as much.
-        let scale = 0.5 * (area / (width * height).max(f32::MIN_POSITIVE)).min(1.0).sqrt();
-        let half = [(width * scale).max(MIN_HALF), (height * scale).max(MIN_HALF)];
-        let [fraction_x, fraction_y] = place.fraction;
-        let middle = [center.x + fraction_x, center.y + fraction_y];
-        Self { pixel: place.pixel, center: middle, half, area, depth: center.depth }
-    }
-
     /// The pixels along an axis that it covers, of `count`, and the fraction of it that each covers.
     #[inline(always)]
     fn covered(&self, axis: usize, count: usize) -> impl Iterator<Item = (usize, f32)> + use<> {
-        let (low, high) = (self.center[axis] - self.half[axis], self.center[axis] + self.half[axis]);
-        let inverse = 0.5 / self.half[axis];
+        let (low, high, inverse) = (self.low[axis], self.high[axis], self.inverse[axis]);
         let shift = self.pixel[axis];
         let (first, end) = (low.floor() as isize, high.ceil() as isize);
         (first.max(-shift)..end.min(count as isize - shift)).map(move |pixel| {
-            let (left, right) = (low.max(pixel as f32), high.min((pixel + 1) as f32));
-            ((pixel + shift) as usize, ((right - left) * inverse).max(0.0))
+            let (start, end) = (pixel as f32, (pixel + 1) as f32);
+            let (left, right) = (if low > start { low } else { start }, if high < end { high } else { end });
+            let fraction = (right - left) * inverse;
+            ((pixel + shift) as usize, if fraction > 0.0 { fraction } else { 0.0 })
         })
+    }
+}
+
+/// The boxes of sixteen cells of a row, by component. Computed for all at once, since that takes longer than adding them to the sums one by one.
+struct CellBoxes {
+    low: [[f32; LANES]; 2],
+    high: [[f32; LANES]; 2],
+    inverse: [[f32; LANES]; 2],
+    area: [f32; LANES],
+    depth: [f32; LANES],
+}
+
+impl CellBoxes {
+    /// The boxes of the cells from column `first` on of a row whose center line has these knots, with the vectors up to the next row there.
+    #[inline(always)]
+    fn new(
+        first: usize,
+        knots: &[Projected; PATCHES + 1],
+        ups: &[[f32; 2]; PATCHES + 1],
+        knots_per_column: f32,
+        place: Place,
+    ) -> Self {
+        const MIN_HALF: f32 = 1e-6;
+        // Those of the knots on both sides of each cell: x, y and depth, and the vectors up.
+        let (mut fractions, mut left_knots, mut right_knots) = ([0.0; LANES], [[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        let (mut left_ups, mut right_ups) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        for lane in 0..LANES {
+            let along = (first as f32 + lane as f32 + 0.5) * knots_per_column;
+            let left = (along as usize).min(PATCHES - 1);
+            fractions[lane] = along - left as f32;
+            let (knot, next) = (&knots[left], &knots[left + 1]);
+            [left_knots[0][lane], left_knots[1][lane], left_knots[2][lane]] = [knot.x, knot.y, knot.depth];
+            [right_knots[0][lane], right_knots[1][lane], right_knots[2][lane]] = [next.x, next.y, next.depth];
+            [left_ups[0][lane], left_ups[1][lane]] = ups[left];
+            [right_ups[0][lane], right_ups[1][lane]] = ups[left + 1];
+        }
+        let [fraction_x, fraction_y] = place.fraction;
+        let mut boxes = Self {
+            low: [[0.0; LANES]; 2],
+            high: [[0.0; LANES]; 2],
+            inverse: [[0.0; LANES]; 2],
+            area: [0.0; LANES],
+            depth: [0.0; LANES],
+        };
+        for lane in 0..LANES {
+            let fraction = fractions[lane];
+            let [dx, dy, dz] = [0, 1, 2].map(|c| right_knots[c][lane] - left_knots[c][lane]);
+            let across = [dx * knots_per_column, dy * knots_per_column];
+            let up_x = (right_ups[0][lane] - left_ups[0][lane]).fma(fraction, left_ups[0][lane]);
+            let up_y = (right_ups[1][lane] - left_ups[1][lane]).fma(fraction, left_ups[1][lane]);
+            let area = (across[0] * up_y - across[1] * up_x).abs();
+            let (width, height) = (across[0].abs() + up_x.abs(), across[1].abs() + up_y.abs());
+            // A parallelogram fills its bounds only if its sides are those of the picture; the box is smaller by as much.
+            let scale = 0.5 * (area / (width * height).max(f32::MIN_POSITIVE)).min(1.0).sqrt();
+            let (half_x, half_y) = ((width * scale).max(MIN_HALF), (height * scale).max(MIN_HALF));
+            let center_x = dx.fma(fraction, left_knots[0][lane]) + fraction_x;
+            let center_y = dy.fma(fraction, left_knots[1][lane]) + fraction_y;
+            (boxes.low[0][lane], boxes.high[0][lane]) = (center_x - half_x, center_x + half_x);
+            (boxes.low[1][lane], boxes.high[1][lane]) = (center_y - half_y, center_y + half_y);
+            (boxes.inverse[0][lane], boxes.inverse[1][lane]) = (0.5 / half_x, 0.5 / half_y);
+            boxes.area[lane] = area;
+            boxes.depth[lane] = dz.fma(fraction, left_knots[2][lane]);
+        }
+        boxes
+    }
+
+    /// That of one cell.
+    #[inline(always)]
+    fn get(&self, lane: usize, place: Place) -> CellBox {
+        CellBox {
+            pixel: place.pixel,
+            low: [self.low[0][lane], self.low[1][lane]],
+            high: [self.high[0][lane], self.high[1][lane]],
+            inverse: [self.inverse[0][lane], self.inverse[1][lane]],
+            area: self.area[lane],
+            depth: self.depth[lane],
+        }
     }
 }
 
@@ -241,19 +307,16 @@ fn draw_cell_row<S: Simd, T: CellSample>(
         let batch = SheetCoordinates { x, y, depth: y.broadcast(1.0) };
         let Some(shade) = sample.shade(context.sheet, &batch) else { continue };
         let mut light = [[0.0; LANES]; 4];
-        shade.light.iter().zip(&mut light).for_each(|(plane, values)| plane.store_slice(values));
+        for (plane, values) in shade.light.iter().zip(&mut light) {
+            plane.store_slice(values);
+        }
+        let boxes = CellBoxes::new(first, &knots, &ups, knots_per_column, place);
         for lane in 0..LANES.min(cells.columns - first) {
-            let values = light.map(|plane| plane[lane]);
+            let values = [light[0][lane], light[1][lane], light[2][lane], light[3][lane]];
             if values == [0.0; 4] {
                 continue;
             }
-            let along = (first as f32 + lane as f32 + 0.5) * knots_per_column;
-            let left = (along as usize).min(PATCHES - 1);
-            let fraction = along - left as f32;
-            let center = knots[left].lerp(&knots[left + 1], fraction);
-            let across = knots[left + 1].step_from(&knots[left], knots_per_column);
-            let up = [0, 1].map(|axis| (ups[left + 1][axis] - ups[left][axis]).fma(fraction, ups[left][axis]));
-            let cell = CellBox::new(&center, place, across, up);
+            let cell = boxes.get(lane, place);
             let coordinates = [x[lane], y[lane]];
             add_cell(context, sample, &cell, (values, shade.t1[lane], coordinates), sums, strip);
         }
@@ -285,7 +348,6 @@ fn add_cell<T: CellSample>(
 ) {
     let luminance = sample.luminance(context.samples.len()) * cell.area;
     let opacity_weight = cell.area / context.samples.len() as f32;
-    let weights = [luminance, luminance, luminance, opacity_weight];
     let [width, height] = [sums.rect.width, sums.rect.height];
     for (y, fraction_y) in cell.covered(1, height) {
         for (x, fraction_x) in cell.covered(0, width) {
@@ -293,10 +355,15 @@ fn add_cell<T: CellSample>(
             if fraction <= 0.0 || sums.limit.get(index).is_some_and(|limit| cell.depth >= *limit) {
                 continue;
             }
-            for ((sum, value), weight) in sums.light[index].iter_mut().zip(values).zip(weights) {
-                *sum = value.fma(fraction * weight, *sum);
-            }
-            sums.depth[index] = sums.depth[index].min(cell.depth);
+            let (light_weight, sum) = (fraction * luminance, &mut sums.light[index]);
+            *sum = [
+                values[0].fma(light_weight, sum[0]),
+                values[1].fma(light_weight, sum[1]),
+                values[2].fma(light_weight, sum[2]),
+                values[3].fma(fraction * opacity_weight, sum[3]),
+            ];
+            let nearest = &mut sums.depth[index];
+            *nearest = if cell.depth < *nearest { cell.depth } else { *nearest };
         }
     }
     if !strip.aovs.is_empty() {
