@@ -13,7 +13,7 @@ use bansho_base::{
     },
     world::wind::{Wind, WindParameters},
 };
-use bansho_environment::fog::{Fog, FogParameters};
+use bansho_environment::fog::Fog;
 use criterion::{Criterion, criterion_group, criterion_main};
 
 #[path = "support/scene.rs"]
@@ -80,7 +80,7 @@ fn one_by_one(view: &View, surroundings: &Surroundings, slice: &DepthInterval, s
 fn fog(criterion: &mut Criterion) {
     let (view, wind) = (scene::view(SIZE), Wind::new(WindParameters::default(), 1, None));
     let surroundings = scene::surroundings(&wind, None);
-    let fog = Fog::new(FogParameters { visibility_m: VISIBILITY_M.into() });
+    let fog = Fog::new(VISIBILITY_M.into());
     let mut group = criterion.benchmark_group("fog 640x360, 4 lamps");
     group.sample_size(10);
     group.bench_function("sixteen lines of sight at a time", |bencher| {

@@ -24,14 +24,13 @@
 //! infinitely far away.
 
 mod light_in_fog;
-mod parameters;
 mod phenomenon;
 mod render;
 mod scattering;
 mod table;
 
-pub use parameters::FogParameters;
 pub use phenomenon::Fog;
+pub use table::FogParameters;
 
 #[cfg(test)]
 mod tests;

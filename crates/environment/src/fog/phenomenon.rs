@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     host::observer::{Cancelled, Observer, check},
+    parameters::animated::Animated,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
         strip::{DepthInterval, Shutter, View},
@@ -11,20 +12,21 @@ use bansho_base::{
     },
 };
 
-use super::{FogParameters, render::PreparedFog, scattering};
+use super::{render::PreparedFog, scattering};
 
 /// The fog of a scene.
 pub struct Fog {
-    parameters: FogParameters,
+    /// Meteorological visibility, m.
+    visibility_m: Animated<f64>,
 }
 
 impl Fog {
     /// The name of its layer.
     pub const NAME: &str = "fog";
 
-    /// Fog with these parameters.
-    pub fn new(parameters: FogParameters) -> Self {
-        Self { parameters }
+    /// Fog of a meteorological visibility in m.
+    pub fn new(visibility_m: Animated<f64>) -> Self {
+        Self { visibility_m }
     }
 }
 
@@ -60,7 +62,7 @@ impl Run for Fog {
         observer: &dyn Observer,
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         check(observer)?;
-        let extinction = scattering::extinction(self.parameters.visibility_m.at(view.shutter.middle()));
+        let extinction = scattering::extinction(self.visibility_m.at(view.shutter.middle()));
         Ok(Box::new(PreparedFog::new(extinction, view, surroundings)))
     }
 }

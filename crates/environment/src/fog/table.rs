@@ -1,13 +1,24 @@
-//! The table `[fog]`.
+//! The table `[fog]` and its parameters.
 
 use std::sync::Arc;
 
 use bansho_base::{
+    parameters::{Range, animated::Animated},
     phenomenon::Phenomenon,
     tables::{BuildContext, BuiltTable, SharedRole, SharedTable, TableCount, TableKind},
 };
 
-use super::{Fog, FogParameters, scattering};
+use super::{Fog, scattering};
+
+bansho_base::parameters! {
+    /// Fog, everywhere above the ground: it dims what is far, and is lit by the sky, lamps and fires. Over a plate it needs the plate's depth, since a plate
+    /// without depth is infinitely far away.
+    pub struct FogParameters {
+        /// Meteorological visibility: the distance at which a black object has 2 % contrast against the horizon. Below 1000 it is called fog, 1000 to 5000 mist,
+        /// above haze.
+        visibility_m: Animated<f64> = Animated::from(500.0), limits(Range::new(1.0, 1e6)), unit("m");
+    }
+}
 
 impl FogParameters {
     /// The table `[fog]`. It is drawn before all other shared tables: within a slice, it is in front of their surfaces.
@@ -37,5 +48,6 @@ impl SharedTable for FogParameters {
 }
 
 fn draw(tables: &[BuiltTable], _context: &BuildContext) -> Arc<dyn Phenomenon> {
-    Arc::new(Fog::new(BuiltTable::first_or_default(tables)))
+    let parameters: FogParameters = BuiltTable::first_or_default(tables);
+    Arc::new(Fog::new(parameters.visibility_m))
 }

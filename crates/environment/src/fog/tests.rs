@@ -16,7 +16,7 @@ use bansho_base::{
     },
 };
 
-use super::{Fog, FogParameters};
+use super::Fog;
 
 const SIZE: [usize; 2] = [16, 9];
 
@@ -32,7 +32,7 @@ fn view() -> View {
 
 /// Light and transmittance of the pixels of fog in some slices.
 fn drawn(visibility_m: f64, surroundings: &Surroundings, slices: &[f64], plate: Option<f32>) -> Vec<[f32; 2]> {
-    let (fog, view) = (Fog::new(FogParameters { visibility_m: visibility_m.into() }), view());
+    let (fog, view) = (Fog::new(visibility_m.into()), view());
     let prepared = fog.prepare(&view, surroundings, &Unobserved).unwrap();
     let rect = Rect::from_size(SIZE[0], SIZE[1]);
     let row = plate.map(|depth| vec![depth; SIZE[0]]);
