@@ -62,13 +62,13 @@ impl Shutter {
         by_path.max(parts_of_motion(self.duration() * (1.0 - 1e-9), MIN_DURATION, MAX_SAMPLES)).next_power_of_two()
     }
 
-    /// Most parts in which things that move during the exposure are drawn: 32 in the usual exposures of films, in which nothing moves far, and up to 128 in
-    /// longer ones, whose smears would show single images otherwise.
+    /// Most parts in which things that move during the exposure are drawn: 32 in the usual exposures of films, in which nothing moves far, and 128 in longer
+    /// ones, whose smears would show single images otherwise.
     #[must_use]
     pub fn max_parts(&self) -> usize {
         /// The longest usual exposure, s.
         const USUAL_S: f64 = 1.0 / 24.0;
-        (32.0 * (self.duration() / USUAL_S).clamp(1.0, 4.0)) as usize
+        if self.duration() <= USUAL_S * (1.0 + 1e-9) { 32 } else { 128 }
     }
 
     /// Five times from its opening to its closing, evenly spaced: enough to measure the path of what moves.
