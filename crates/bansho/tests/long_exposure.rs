@@ -461,3 +461,30 @@ fn long_exposures_of_the_sky_are_the_mean_of_short_ones() {
 fn long_exposures_of_things_that_cross_are_the_mean_of_short_ones() {
     compare(CROSSINGS.iter());
 }
+
+/// Something else cuts the ground into slices of depth, and its rows move from one slice to another while the camera pans. They must stay opaque.
+#[test]
+fn ground_that_moves_from_slice_to_slice_stays_opaque() {
+    for shutter_s in [0.08, 0.32] {
+        let text = format!(
+            "bansho = 2\n[picture]\nsize = {SIZE:?}\nfps = 24\nexposure_ev100 = 3\n\
+             [camera]\n{}shutter_s = {shutter_s}\n\
+             [sky]\nluminance = 5\n[ground]\n[[light]]\nposition = [1, 3, 0]\nintensity = 900\n\
+             [[obstacle]]\nvisible = true\nposition = [-1, 0.5, 0]\n",
+            CameraMotion::LongPan.table()
+        );
+        let compiled = compile_scene("pan", &text, Arc::new(MemoryAssets::default())).unwrap();
+        let plan = Plan::new(&compiled, &PlanOptions { layers: true, ..PlanOptions::default() }).unwrap();
+        let frame = bansho::draw(&mut Shot::open(compiled, Arc::new(plan)), 0, &Unobserved).unwrap();
+        let alpha = |layer: &str| {
+            let name = format!("{layer}.A");
+            &frame.channels.iter().find(|channel| channel.name == name).unwrap().values
+        };
+        // The lower third of the picture is below the horizon.
+        for (pixel, (ground, obstacle)) in
+            alpha("ground").iter().zip(alpha("obstacles")).enumerate().skip(SIZE[0] * 2 * SIZE[1] / 3)
+        {
+            assert!(ground + obstacle > 0.999, "{shutter_s} s, row {}: {ground} and {obstacle}", pixel / SIZE[0]);
+        }
+    }
+}

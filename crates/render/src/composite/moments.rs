@@ -1,8 +1,8 @@
 //! Things that move over the same pixels while the shutter is open, composited at each moment of the exposure.
 //!
-//! Compositing is linear in each of its members: where only one of them moves, the mean of its parts, composited with all others, is the mean of the
-//! composites. Where two move, it is not: things that pass through the same pixel one after the other would hide each other. There the exposure is cut into
-//! moments, each of which shows one part of every member, and the composites of the moments are averaged.
+//! Compositing is linear in each of its members in each slice: where only one of them moves, and within its slice, the mean of its parts, composited with all
+//! others, is the mean of the composites. Where two move, it is not: things that pass through the same pixel one after the other would hide each other. Nor is it
+//! where one moves from slice to slice, since it would hide itself. There the exposure is cut into moments, each of which shows one part of every member, and the composites of the moments are averaged.
 //!
 //! Slices are drawn from near to far, and each part of a member is composited at once into all moments that it belongs to. So each part is drawn once for
 //! each slice, and members without parts once for all moments.

@@ -261,8 +261,9 @@ impl Shot {
             })
             .collect::<Result<_, _>>()?;
         let names = self.table_names(which);
-        let (prepared, moments) = self.moments(which, prepared, inputs, observer)?;
-        Ok(PreparedSlices { slices: slices::cut(&intervals, &names), prepared, moments })
+        let slices = slices::cut(&intervals, &names);
+        let (prepared, moments) = self.moments(which, prepared, &slices, inputs, observer)?;
+        Ok(PreparedSlices { slices, prepared, moments })
     }
 
     /// The wholes of prepared phenomena, and the moments of those that move. What blurs itself is prepared in parts where another one moves over its pixels.
@@ -270,6 +271,7 @@ impl Shot {
         &'a self,
         which: &[usize],
         prepared: Vec<PreparedExposure<'a>>,
+        slices: &[Slice],
         inputs: PreparationInputs<'a>,
         observer: &dyn Observer,
     ) -> Result<(Vec<Box<dyn Prepared + 'a>>, Moments<'a>), RenderError> {
@@ -287,17 +289,14 @@ impl Shot {
                     let _part = begin_preparation(run, is_mirrored, observer);
                     parts_of_whole = exposure_parts::prepare_parts(&*run.run, exposure, observer)?;
                 }
-                let moving = (!parts_of_whole.is_empty()).then(|| MovingMember {
-                    member,
-                    parts: parts_of_whole,
-                    rect: rects[member],
-                });
+                let moves = !parts_of_whole.is_empty();
+                let moving = moves.then(|| MovingMember::new(member, parts_of_whole, rects[member]));
                 Ok((whole, moving))
             },
         );
         let members: Vec<(Box<dyn Prepared>, Option<MovingMember>)> = members.collect::<Result<_, Cancelled>>()?;
         let (wholes, moving): (Vec<_>, Vec<_>) = members.into_iter().unzip();
-        Ok((wholes, Moments::new(moving.into_iter().flatten().collect())))
+        Ok((wholes, Moments::new(moving.into_iter().flatten().collect(), slices)))
     }
 
     /// The names of those phenomena that have a table of their own; `None` for the tables that phenomena share.
