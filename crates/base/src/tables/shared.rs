@@ -33,7 +33,7 @@ pub struct SharedRole {
     pub draw_order: u8,
     /// Whether it is behind every plate, so that an opaque plate hides it.
     pub is_behind_plates: bool,
-    /// Its place in the fingerprint of what simulations depend on. It must stay what it was in earlier versions, lest `--resume` draws all frames again: lights
+    /// Its place in the fingerprint of what simulations depend on. It must not change between versions, since `--resume` would draw all frames again: lights
     /// have 10, the sky 20, the ground 30, obstacles 40.
     pub fingerprint_order: u8,
     /// Tables that prevent that one of this kind is implied by the phenomena of a scene, besides its own kind; `None` if it is never implied. See

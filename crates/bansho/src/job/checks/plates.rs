@@ -20,7 +20,7 @@ pub(crate) fn check(scene: &SceneFile, compiled: &CompiledScene, numbers: &[i64]
     Ok(())
 }
 
-/// Checks the files of the plate at `key`, one for each frame: first that none is missing, which is quickly told.
+/// Checks the files of the plate at `key`, one for each frame: first that none is missing, which takes little time.
 fn check_files(compiled: &CompiledScene, key: &str, path: &str, numbers: &[i64]) -> Result<(), String> {
     let missing = numbers.iter().filter_map(|&number| Some((number, compiled.assets().find(path, number).err()?)));
     let missing: Vec<(i64, AssetError)> = missing.collect();
