@@ -10,10 +10,10 @@ bansho_base::choice! {
     pub enum Method {
         /// Textures of all drops of one diameter in a cubic meter, on upright billboards (Yoshida, Dobashi & Yamamoto).
         Billboards = "billboards",
-        /// Every drop individually: the reference, slower the heavier the rain.
+        /// Every drop individually. This is the reference; heavier rain takes longer.
         Drops = "drops",
-        /// To the letter of that paper: streak textures of 512 x 512 pixels in 8 bits for fixed rain rates, on billboards around the camera that are lit at
-        /// their corners. No wind, no sky light, no airlight; the textures repeat, and change abruptly with the rain rate.
+        /// The method of Yoshida, Dobashi & Yamamoto to the letter: streak textures of 512 x 512 pixels in 8 bits for fixed rain rates, on billboards around
+        /// the camera that are lit at their corners. There is no wind, no sky light and no airlight. The textures repeat, and change abruptly with the rain rate.
         Textures = "textures",
     }
 }
@@ -33,7 +33,8 @@ bansho_base::choice! {
     pub enum OpacityLaw {
         /// Fraction of the exposure during which the drop covers a point.
         ExposureFraction = "exposure_fraction",
-        /// 2 D / v as Yoshida, Dobashi & Yamamoto print it, with D in mm and v in m/s: 67 times as much on the axis in 1/30 s, and the same for any exposure.
+        /// 2 D / v as Yoshida, Dobashi & Yamamoto print it, with D in mm and v in m/s. It is the same for any exposure; on the axis it is 67 times the fraction
+        /// of an exposure of 1/30 s.
         Paper = "paper",
     }
 }
@@ -60,7 +61,7 @@ bansho_base::parameters! {
         /// Diameters of the drops that are drawn as streaks, ascending; each represents a bin of diameters. All other drops only contribute to the
         /// airlight.
         diameters_mm: Vec<f64> = PAPER_DIAMETERS_MM.to_vec(), limits(Length { min: 1, max: 12, item: Range::new(0.1, 8.0) }), unit("mm");
-        /// Rain rates of the textures of `method = "textures"`, ascending; the nearest to the rain rate is shown.
+        /// Rain rates of the textures of `method = "textures"`, ascending; textures of the rate nearest to the rain rate are shown.
         texture_rates_mm_per_h: Vec<f64> = vec![1.0, 5.0, 10.0, 20.0], limits(Length { min: 1, max: 12, item: Range::new(0.1, 300.0) }), unit("mm/h");
         /// Law of the terminal velocities.
         terminal_velocity: VelocityLaw = VelocityLaw::GunnKinzer;
@@ -74,15 +75,15 @@ bansho_base::parameters! {
         opacity: OpacityLaw = OpacityLaw::ExposureFraction;
         /// Factor of that opacity.
         opacity_gain: f64 = 1.0, limits(Range::new(0.0, 20.0));
-        /// Amplitude of the brightness of a streak in the light of lamps and fires as its drop oscillates, relative to its mean: speckle along near
-        /// streaks (Garg & Nayar 2006). 0 for drops that do not oscillate. Not with `method = "textures"`.
+        /// Amplitude of the brightness along a streak in the light of lamps and fires, relative to the mean. It causes speckle along near streaks, whose drops
+        /// oscillate (Garg & Nayar 2006). 0 for drops that do not oscillate. Not used by `method = "textures"`.
         oscillation: f64 = 0.0, limits(Range::new(0.0, 1.0));
         /// Response of the drops to the wind; at 1 they drift with the air.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 2.0));
         /// Whether the light of streaks is omitted where no display would show it.
         culling: bool = true;
-        /// Contribution to a pixel up to which a streak on a billboard stands for several drops, in 8-bit codes of display white. 0 draws every drop, as frames
-        /// with AOVs always do. Only with `method = "billboards"`.
+        /// Contribution to a pixel, in 8-bit codes of display white, up to which one streak on a billboard may represent several drops. 0 draws every drop;
+        /// frames with AOVs always do so. Only used by `method = "billboards"`.
         simplification_codes: f64 = 1.5, limits(Range::new(0.0, 16.0));
         /// Splashes of drops on the ground.
         splashes: SplashParameters = SplashParameters::default();

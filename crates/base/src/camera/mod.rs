@@ -31,17 +31,17 @@ crate::choice! {
 const EYE_HEIGHT: f64 = 1.7;
 
 crate::parameters! {
-    /// The camera. In a dome, `target` is at the center of the circle. Without `position` and `target` a scene has a camera that shows its phenomena
-    /// well, if they are all of one kind with default positions and sizes and there are no obstacles and no plate: a flame is seen from near, rain along
-    /// its lamps. Auroras are seen from the ground, looking up to the north; the center of a dome is then the zenith.
+    /// The camera. In a dome, `target` is at the center of the circle. Without `position` and `target` a scene has a camera that shows its phenomena well, if
+    /// they are all of one kind with default positions and sizes and there are no obstacles and no plate. A flame is then seen from nearby, and rain along its
+    /// lamps. Auroras are seen from the ground, looking up to the north, or toward the zenith in a dome.
     pub struct CameraParameters {
         /// Position of the camera.
         position: Animated<[f64; 3]> = Animated::from([0.0, 1.2, 4.0]), unit("m");
         /// Point that the camera looks at.
         target: Animated<[f64; 3]> = Animated::from([0.0, 0.9, 0.0]), unit("m");
-        /// Direction that is at the top of the picture, as far as the line of sight allows. A camera that tilts through the zenith, or flies over its
-        /// target, would turn the picture by 180 degrees where it looks along this direction: choose or key one that the line of sight never meets, such
-        /// as [0, 0, 1] for a dome that tilts from the zenith to the north.
+        /// Direction that is at the top of the picture, as far as the line of sight allows. A camera that tilts through the zenith, or flies over its target,
+        /// would turn the picture by 180 degrees where it looks along this direction. Choose or animate a direction that the line of sight never meets, such as
+        /// [0, 0, 1] for a dome that tilts from the zenith to the north.
         up: Animated<[f64; 3]> = Animated::from([0.0, 1.0, 0.0]);
         /// Rotation about the line of sight; positive tilts the camera to its left.
         roll_deg: Animated<f64> = Animated::from(0.0), limits(Range::new(-3600.0, 3600.0)), unit("degrees");
@@ -57,7 +57,7 @@ crate::parameters! {
         fisheye_fov_deg: f64 = 180.0, limits(Range::new(1.0, 360.0)), unit("degrees");
         /// Near clipping distance: nothing nearer is drawn.
         near: f64 = 0.05, limits(Range::new(1e-4, 1e4)), unit("m");
-        /// Lens shift: how much farther to the right and up the picture looks without turning, in picture heights. The principal point moves the other way.
+        /// Lens shift: displacement of the view to the right and up, in picture heights, without rotating the camera. The principal point moves the other way.
         shift: [f64; 2] = [0.0, 0.0], limits(Range::new(-10.0, 10.0)), unit("picture heights");
         /// Exposure time; half a frame if omitted.
         shutter_s: Option<f64> = None, limits(Range::new(0.0, 10.0)), unit("s");

@@ -40,10 +40,10 @@ bansho_base::choice! {
     pub enum GasModel {
         /// Gas burns, heats up, forms soot, rises and mixes with air; it is removed some time after it has burnt out.
         Combustion = "combustion",
-        /// The paper's algorithm (section 4.3): in each step the same number of particles is added, with equal speed, temperature and mass; Euler's
-        /// equation, eq. (1), with pressure and the wind's force per volume moves them; when there are more than `particles`, the oldest are removed.
-        /// Nothing burns, cools or is buoyant. Of `fluid`, `forces` and `combustion` only `support_radius`, `rest_density`, `stiffness`,
-        /// `pressure_kernel`, `negative_pressure`, `wind_response` and `soot_ppm` apply. A burner's gas rises to its `height` at constant `speed`.
+        /// The paper's algorithm (section 4.3). In each step the same number of particles is added, with equal speed, temperature and mass. They move by
+        /// Euler's equation, eq. (1), with pressure and the wind's force per volume. When there are more than `particles`, the oldest are removed. Nothing
+        /// burns, cools or is buoyant. Of `fluid`, `forces` and `combustion` only `support_radius`, `rest_density`, `stiffness`, `pressure_kernel`,
+        /// `negative_pressure`, `wind_response` and `soot_ppm` apply. A burner's gas rises to the burner's `height` at constant `speed`.
         Euler = "euler",
     }
 }
@@ -73,8 +73,8 @@ bansho_base::parameters! {
     pub struct BurnerParameters {
         /// Shape of the surface.
         shape: BurnerShape = BurnerShape::Disk;
-        /// Position of its center relative to `position` of the flame. If the burner moves, gas is emitted at its current position; the burner's velocity is not added to that of
-        /// the gas.
+        /// Position of its center relative to the flame's `position`. If the burner moves, gas is emitted at its current position; the burner's velocity is not
+        /// added to that of the gas.
         position: Animated<[f64; 3]> = Animated::from([0.0, 0.0, 0.0]), unit("m");
         /// Rotation about x, then y, then z; without rotation gas is emitted upward.
         rotation_deg: [f64; 3] = [0.0, 0.0, 0.0], limits(Range::new(-3600.0, 3600.0)), unit("degrees");
@@ -105,14 +105,14 @@ bansho_base::parameters! {
 bansho_base::parameters! {
     /// Smoothed particle hydrodynamics, section 4.
     pub struct FluidParameters {
-        /// Support radius d, eq. (2), in mean distances of particles at the burner.
+        /// Support radius d, eq. (2), in mean distances between particles at the burner.
         support_radius: f64 = 2.3, limits(Range::new(1.2, 6.0)), unit("distances");
         /// Rest density rho_0, eq. (11), as a fraction of the density at the burner.
         rest_density: f64 = 0.8, limits(Range::new(0.0, 10.0));
         /// Speed of sound, `sqrt(k)` of eq. (11) at the burner's temperature, as a multiple of the exit speed of the gas. It determines how
         /// compressible the gas is.
         stiffness: f64 = 1.2, limits(Range::new(0.0, 20.0));
-        /// Kernel of the pressure force, eq. (12). The paper uses `"poly6"`; its gradient vanishes at the center, so that particles clump.
+        /// Kernel of the pressure force, eq. (12). The paper uses `"poly6"`, whose gradient vanishes at the center, so particles clump.
         pressure_kernel: KernelShape = KernelShape::Spiky;
         /// Pressure of gas of low density, eq. (11).
         negative_pressure: NegativePressure = NegativePressure::Clamped;
@@ -133,7 +133,7 @@ bansho_base::parameters! {
         buoyancy: f64 = 1.0, limits(Range::new(0.0, 10.0));
         /// Model of the wind's effect on the gas.
         wind_model: WindForce = WindForce::Entrainment;
-        /// Factor of the wind's effect; for `wind_model = "body_force"` force per volume and wind speed, in N s/m^4.
+        /// Factor of the wind's effect. With `wind_model = "body_force"` it is the force per volume divided by the wind speed, in N s/m^4.
         wind_response: f64 = 1.0, limits(Range::new(0.0, 100.0));
         /// Entrainment coefficient: speed at which air enters the gas, as a fraction of their relative speed. Entrained air slows, dilutes and cools the gas.
         entrainment: f64 = 0.12, limits(FRACTION);
@@ -160,8 +160,8 @@ bansho_base::parameters! {
         flame_temperature_k: f64 = 1900.0, limits(KELVIN), unit("K");
         /// Time constant of heating.
         heating_time_s: f64 = 0.03, limits(Range::new(1e-3, 10.0)), unit("s");
-        /// Dependence of combustion on exposure to air: at 0 all gas burns at the same rate, at 1 gas at the surface burns first, so that flames
-        /// taper toward the tip.
+        /// Dependence of combustion on exposure to air. At 0 all gas burns at the same rate; at 1 gas at the surface burns first, so flames taper toward the
+        /// tip.
         oxygen_dependence: f64 = 0.75, limits(FRACTION);
         /// Volume fraction of soot in burning gas, in parts per million.
         soot_ppm: f64 = 1.2, limits(Range::new(0.0, 100.0)), unit("1e-6");
@@ -178,12 +178,12 @@ bansho_base::parameters! {
 bansho_base::parameters! {
     /// Burning gas as particles that move by smoothed-particle hydrodynamics (Inagaki et al.), for fires that interact with wind and obstacles.
     pub struct FlameParticlesParameters {
-        /// Position of the flame, to which those of burners and domain are relative.
+        /// Position of the flame. The positions of burners and domain are relative to it.
         position: [f64; 3] = [0.0, 0.0, 0.0], unit("m");
         /// Burners; an empty list is one burner with default values.
         burners: Vec<BurnerParameters> = Vec::new(), limits(Length { min: 0, max: 200, item: () });
-        /// Approximate number of particles alive at a time, of all burners together. The actual number is up to a fifth lower, since some gas burns out
-        /// early, and varies with puffing. More than 20 million are rejected, with an error that states the memory they would take.
+        /// Approximate number of particles alive at a time, of all burners together. The actual number varies with puffing and is up to a fifth lower, since
+        /// some gas burns out early. More than 20 million are rejected, with an error that states the memory they would take.
         particles: i64 = 12_000, limits(Range::new(1.0, 1e12));
         /// Model of the gas: combustion, or the paper's constant particles.
         gas_model: GasModel = GasModel::Combustion;
@@ -212,7 +212,7 @@ bansho_base::choice! {
     pub enum SpriteStyle {
         /// The line integral of its kernel: sums of sprites are the exact line integrals of the gas, and light and opacity follow from its soot.
         LineIntegral = "line_integral",
-        /// The paper's sprite: poly6 itself, times the color of a black body, added; opacity depends on density.
+        /// The paper's sprite: poly6 itself, times the color of a black body. The light of sprites is added; opacity depends on density.
         Poly6 = "poly6",
         /// A square colored by density, as in the paper's figure 7: red where the gas is dense.
         Squares = "squares",
@@ -224,8 +224,8 @@ bansho_base::choice! {
     pub enum HeatHazeModel {
         /// By the gradient of the optical path through its gas, which follows from its temperature and the volume that it fills.
         Refraction = "refraction",
-        /// By the gradient of poly6 itself, equally for all particles, as in the paper (figure 3): as much as gas that has just been emitted, if
-        /// `heat_haze_gain` is 1.
+        /// By the gradient of poly6 itself, equally for all particles, as in the paper (figure 3). With `heat_haze_gain = 1` a particle deflects light as much
+        /// as gas that has just been emitted.
         Poly6 = "poly6",
     }
 }
@@ -237,7 +237,8 @@ bansho_base::parameters! {
         sprite: SpriteStyle = SpriteStyle::LineIntegral;
         /// Factor of absorption and emission of soot; at 1 they follow from its volume fraction.
         soot_gain: f64 = 1.0, limits(Range::new(0.0, 1000.0));
-        /// Amount of detail finer than the particles, by intermittent burning; 0 is the smooth sum of the particles. The mean light does not change.
+        /// Amount of detail finer than the particles, which comes from intermittent burning. At 0 the picture is the smooth sum of the particles. The mean
+        /// light does not change.
         detail: f64 = 0.85, limits(FRACTION);
         /// Size of the detail, in support radii.
         detail_size: f64 = 0.9, limits(Range::new(0.05, 20.0));

@@ -24,7 +24,7 @@ bansho_base::parameters! {
         rate: f64 = 0.0, limits(Range::new(0.0, 1_000.0)), unit("1/s");
         /// Initial speed, upward.
         speed: f64 = 2.2, limits(Range::new(0.0, 100.0)), unit("m/s");
-        /// Variation of the speed between sparks, as a fraction: from 1 minus to 1 plus this fraction of `speed`.
+        /// Variation of the speed between sparks, as a fraction: speeds are between `1 - speed_variation` and `1 + speed_variation` times `speed`.
         speed_variation: f64 = 0.5, limits(FRACTION);
         /// Horizontal amplitude of their swirl.
         swirl: f64 = 0.12, limits(Range::new(0.0, 100.0)), unit("m");
