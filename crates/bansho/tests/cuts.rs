@@ -182,7 +182,7 @@ fn a_turn_that_nobody_asked_for_is_told_with_its_time() {
     assert_eq!(told.key.as_deref(), Some("up"));
     assert_eq!(
         told.message,
-        "the picture turns by 180 degrees at 1.003 s, between frames 30 and 31, since the camera looks along its `up` there; with `up = [0, 0, -1]` it does not"
+        "the picture turns by 180 degrees at 1.003 s, between frames 30 and 31, because the camera then looks along `up`; with `up = [0, 0, -1]` it does not turn"
     );
     assert_eq!(remark(&format!("{tilt}up = [0.0, 0.0, 1.0]\n")), None);
     assert_eq!(remark("target = [0.0, 60.0, 0.0]\n"), None);

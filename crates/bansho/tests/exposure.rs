@@ -113,7 +113,7 @@ fn a_crop_is_lit_by_the_whole_plate() {
 fn what_hardly_changes_a_plate_is_told_and_what_shows_is_not() {
     let faint = |text: &str| {
         let remarks = plan(&format!("{PLATE}exposure_ev100 = 12\n{text}"), plate(None)).remarks();
-        let each = remarks.into_iter().filter(|(_, remark)| remark.message.contains("which is hardly seen"));
+        let each = remarks.into_iter().filter(|(_, remark)| remark.message.contains("which is hardly visible"));
         each.map(|(name, _)| name).collect::<Vec<_>>()
     };
     assert_eq!(faint("[[rain]]\nrate_mm_per_h = 0.2\n"), ["rain"]);

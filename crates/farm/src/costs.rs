@@ -242,7 +242,7 @@ mod tests {
         check_space(Path::new("a"), required, Some(required)).unwrap();
         check_space(Path::new("a"), required, None).unwrap();
         let error = check_space(Path::new("a"), required, Some(900_000_000)).unwrap_err().to_string();
-        assert_eq!(error, "a: the frames will take about 6.5 TB, and 900.0 MB are free");
+        assert_eq!(error, "a: the frames will take about 6.5 TB, but only 900.0 MB are free");
         assert_eq!(in_words(999), "999 bytes");
     }
 }

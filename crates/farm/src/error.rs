@@ -74,7 +74,7 @@ pub enum FarmError {
     #[error("the tasks were planned again after this one was submitted; allowed: the tasks of the last plan")]
     PlanReplaced,
     /// The tasks were planned by another version.
-    #[error("this machine runs {found}, and the tasks were planned by {expected}; allowed: the same version")]
+    #[error("this machine runs {found}, but the tasks were planned by {expected}; allowed: the same version")]
     Version {
         /// The version of the plan.
         expected: String,
@@ -109,7 +109,7 @@ pub enum FarmError {
         count: usize,
     },
     /// More tiles than tasks are possible.
-    #[error("{tiles} tiles, which are as many tasks; allowed: up to {max}")]
+    #[error("{tiles} tiles, each of which is a task; allowed: up to {max}")]
     TooManyTiles {
         /// Number of tiles.
         tiles: usize,
@@ -127,13 +127,13 @@ pub enum FarmError {
         least_chunk: u64,
     },
     /// A film or a contact sheet, whose frames cannot be drawn by different tasks.
-    #[error("{path}: one file holds all frames, and tasks write one file a frame; allowed: .png, .exr", path = .path.display())]
+    #[error("{path}: one file holds all frames, but tasks write one file per frame; allowed: .png, .exr", path = .path.display())]
     NotASequence {
         /// The output.
         path: PathBuf,
     },
     /// The frames would not fit on the disk.
-    #[error("{path}: the frames will take about {required}, and {available} are free", path = .path.display())]
+    #[error("{path}: the frames will take about {required}, but only {available} are free", path = .path.display())]
     Space {
         /// The folder.
         path: PathBuf,
@@ -155,7 +155,7 @@ pub enum FarmError {
         text: String,
     },
     /// Not every frame is complete.
-    #[error("{files}: frames {frames} are missing or not complete; the film is made when all are", files = .files.display())]
+    #[error("{files}: frames {frames} are missing or incomplete; a film needs all frames", files = .files.display())]
     Incomplete {
         /// The frames, in the syntax of frame lists.
         frames: String,

@@ -30,7 +30,7 @@ use super::{
 /// Finishes the shot of a plan. Tells what the flipbook consists of.
 ///
 /// # Errors
-/// Frames are missing or not complete, the scene has changed, or a product cannot be written.
+/// Frames are missing or incomplete, the scene has changed, or a product cannot be written.
 pub fn finish(
     job: &Job,
     folder: &FarmFolder,
@@ -65,7 +65,7 @@ impl FinishedFrames {
 /// Checks that all frames of `job` are whole. Where they are drawn as tiles, these must be, and are joined.
 ///
 /// # Errors
-/// Frames are missing or not complete, or a joined one cannot be written.
+/// Frames are missing or incomplete, or a joined one cannot be written.
 pub fn finish_frames(
     job: &Job,
     folder: &FarmFolder,

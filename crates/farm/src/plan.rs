@@ -269,7 +269,7 @@ impl FarmFolder {
         let plan: FarmPlan = serde_json::from_str(&object)
             .map_err(|error| FarmError::PlanFormat { path: path.clone(), reason: error.to_string() })?;
         if plan.tiles.iter().any(|side| !(1..=MAX_TILES).contains(side)) || plan.digests.len() != plan.grid()?.count() {
-            let reason = "its numbers of tiles and chunks do not fit".to_owned();
+            let reason = "its numbers of tiles and chunks do not match".to_owned();
             return Err(FarmError::PlanFormat { path, reason });
         }
         Ok(plan)

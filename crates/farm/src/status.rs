@@ -61,7 +61,7 @@ impl FrameCounts {
 pub enum TaskState {
     /// All its frames are whole.
     Done,
-    /// It has not begun, or waits to begin once more.
+    /// It has not started, or waits to start again.
     Waiting,
     /// It began and did not end. Unless the batch system was asked, it may have been killed.
     Running,

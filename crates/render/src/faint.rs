@@ -20,7 +20,7 @@ const VISIBLE_FRACTION: f64 = 0.001;
 /// Largest number of phenomena that are measured: for each, a picture of all the others is drawn.
 const MAX_MEASURED: usize = 16;
 
-/// Remarks on those phenomena that change the plate so little that they are hardly seen; none without a plate.
+/// Remarks on those phenomena that change the plate so little that they are hardly visible; none without a plate.
 ///
 /// Measured in a thumbnail of the middle frame, and where that shows no change in those of the first and last frame. Phenomena that are
 /// simulated in steps are left out. With more than [`MAX_MEASURED`] phenomena nothing is measured.
@@ -49,7 +49,7 @@ pub(crate) fn faint_phenomenon_remarks(compiled: &CompiledScene, plan: &Plan) ->
         let Ok(change) = greatest_change(&closed_forms, plan, info.name) else { continue };
         if change.is_faint() {
             let message = format!(
-                "it changes the picture by {:.1} %, which is hardly seen; to show it, {}, or lower `exposure_ev100` in [plate]",
+                "it changes the picture by {:.1} %, which is hardly visible; to show it, {}, or lower `exposure_ev100` in [plate]",
                 100.0 * change.mean,
                 info.strengthened_by
             );

@@ -91,7 +91,7 @@ fn of_drawings(compiled: &CompiledScene) -> Vec<(String, Remark)> {
     remarks
 }
 
-/// Where the camera looks along its `up`, so that the picture turns suddenly.
+/// A remark on the times at which the camera looks along its `up`, so that the picture turns suddenly.
 fn turns_of_picture(plan: &Plan) -> Option<Remark> {
     let frames = plan.frames();
     let frame_s = plan.fps().frame_s();
@@ -106,11 +106,11 @@ fn turns_of_picture(plan: &Plan) -> Option<Remark> {
         count => format!(", and {} more times until {:.3} s", count - 1, turns[count - 1].time),
     };
     let remedy = match better_up {
-        Some([x, y, z]) => format!("with `up = [{x}, {y}, {z}]` it does not"),
-        None => "key `up` to directions that the line of sight never meets".to_owned(),
+        Some([x, y, z]) => format!("with `up = [{x}, {y}, {z}]` it does not turn"),
+        None => "animate `up` with directions that the line of sight never meets".to_owned(),
     };
     let message = format!(
-        "the picture turns by {degrees:.0} degrees at {time:.3} s, between frames {number} and {}{others}, since the camera looks along its `up` there; \
+        "the picture turns by {degrees:.0} degrees at {time:.3} s, between frames {number} and {}{others}, because the camera then looks along `up`; \
          {remedy}",
         number + 1
     );

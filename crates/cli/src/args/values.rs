@@ -33,7 +33,7 @@ pub(super) fn parse_frames(text: &str) -> Result<Frames, FrameListError> {
 pub(super) enum ValueError {
     #[error("allowed: WIDTHxHEIGHT such as 1920x1080, 1 to {LARGEST_SIDE} on a side")]
     Size,
-    #[error("allowed: auto, or a number of frames from 1 on")]
+    #[error("allowed: auto, or a number of frames of at least 1")]
     Chunk,
     #[error("allowed: COLUMNSxROWS such as 8x8, up to 4096 frames in all")]
     Grid,

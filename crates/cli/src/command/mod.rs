@@ -30,7 +30,7 @@ fn thread_pool(threads: Option<u16>) -> anyhow::Result<rayon::ThreadPool> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
     pool.with_context(|| match threads {
         Some(count) => format!("--threads {count}: the system cannot start that many threads; allowed: fewer"),
-        None => "the system starts no thread for each core; --threads states how many".to_owned(),
+        None => "the system cannot start one thread per core; --threads sets their number".to_owned(),
     })
 }
 

@@ -142,7 +142,7 @@ fn a_killed_task_is_lost_where_slurm_can_be_asked() {
     assert_eq!(asked_status(&folder, "77 1 RUNNING\n")["finish"]["state"], "lost");
     let text = Run::of(with_slurm(&folder, &mut folder.command(&["farm", "status", "scene.toml"])).output().unwrap());
     assert!(
-        text.stdout.contains("lost: begun on") && text.stdout.contains("neither ended nor queued"),
+        text.stdout.contains("lost: started on") && text.stdout.contains("neither ended nor queued"),
         "{}",
         text.stdout
     );

@@ -345,7 +345,7 @@ fn summary(plan: &FarmPlan, tasks: usize, frames: usize, with_snapshots: bool, f
     }
     let ShotCosts { startup_s, step_s, draw_s, .. } = plan.costs;
     let stepping = if step_s > 0.0 { format!(", {step_s:.2} s a step") } else { String::new() };
-    let snapshots = if with_snapshots { ", after a job that leaves snapshots" } else { "" };
+    let snapshots = if with_snapshots { ", after a job that writes snapshots" } else { "" };
     format!(
         "{} in {} of up to {}{snapshots}: {}\nmeasured here: {draw_s:.2} s a frame{stepping}, {startup_s:.1} s before the first\n",
         counted(frames, "frame"),

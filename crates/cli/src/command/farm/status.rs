@@ -66,7 +66,7 @@ fn as_text(status: &FarmStatus) -> String {
         (FinishStatus::Lost, _) => {
             writeln!(
                 text,
-                "last job: not queued, nor is any other: they were killed or canceled; submit the rest again"
+                "last job: not queued, and neither are the others: they were killed or canceled; submit the rest again"
             )
         }
         (FinishStatus::Blocked { by }, _) => {
@@ -93,11 +93,11 @@ fn task_line(task: &TaskStatus, asked: bool) -> String {
     let on_node = on_node.unwrap_or_default();
     let state = match (task.state, last.and_then(|last| last.code)) {
         (TaskState::Done, _) => "done".to_owned(),
-        (TaskState::Waiting, _) if last.is_some() => format!("waits to begin once more; begun before{on_node}"),
-        (TaskState::Waiting, _) => "not begun".to_owned(),
+        (TaskState::Waiting, _) if last.is_some() => format!("waits to start again; started before{on_node}"),
+        (TaskState::Waiting, _) => "not started".to_owned(),
         (TaskState::Running, _) if asked => format!("runs{on_node}"),
-        (TaskState::Running, _) => format!("begun{on_node}"),
-        (TaskState::Lost, _) => format!("lost: begun{on_node}, and neither ended nor queued"),
+        (TaskState::Running, _) => format!("started{on_node}"),
+        (TaskState::Lost, _) => format!("lost: started{on_node}, but neither ended nor queued"),
         (TaskState::Ended, code) => format!("ended{on_node}, with exit code {}", code.unwrap_or(0)),
     };
     format!(
