@@ -33,7 +33,7 @@ pub struct TemplateOptions {
     pub size: [usize; 2],
     /// Frames of a chunk.
     pub chunk_frames: u64,
-    /// Wanted time of a chunk, s, by which schedulers adapt the number of frames.
+    /// Target time of a chunk, s, by which schedulers adapt the number of frames.
     pub task_s: u64,
     /// Columns and rows of tiles of a picture.
     pub tiles: [usize; 2],
@@ -43,7 +43,7 @@ pub struct TemplateOptions {
     pub options: Vec<String>,
     /// What is made at the end; relative paths are those of the folder of the frames.
     pub products: Products,
-    /// A random word, which the first step leaves in the folder of the frames.
+    /// A random token, which the first step writes to the folder of the frames.
     pub token: String,
     /// The program and its version.
     pub program: String,

@@ -34,7 +34,7 @@ Examples:
   bansho farm slurm shot.toml --film shot.mp4 --sbatch=--account=films
   bansho farm slurm shot.toml --flipbook game/a.png --flipbook-grid 8x8")]
     Slurm(Box<SlurmArgs>),
-    /// Print which frames of a shot are whole, missing or stale, and what became of its tasks. The exit code is 0 only if all is whole.
+    /// Print which frames of a shot are whole, missing or stale, and the state of its tasks. The exit code is 0 only if everything is whole.
     Status(FarmStatusArgs),
     /// Write a job template of Open Job Description, for AWS Deadline Cloud and other schedulers.
     #[command(after_help = "\
@@ -47,7 +47,7 @@ Examples:
     Openjd(OpenjdArgs),
     /// Check that every frame of a shot is whole, join tiles, and make a film and a contact sheet of the frames. Only a flipbook is drawn.
     Finish(Box<FinishArgs>),
-    /// Leave snapshots at the beginning of chunks that have frames to draw. Nothing is drawn. Templates of `farm openjd` do this.
+    /// Write snapshots at the beginning of chunks that have frames to draw. Nothing is drawn. Templates of `farm openjd` do this.
     Snapshots(Box<SnapshotsArgs>),
     /// Draw one tile of each frame. Templates of `farm openjd` do this.
     Tile(Box<TileArgs>),
@@ -65,10 +65,10 @@ pub(crate) struct SlurmArgs {
     /// Frames of a task, or `auto` for tasks of about --task-minutes.
     #[arg(long, value_name = "auto|N", default_value = "auto", value_parser = values::parse_chunk, help_heading = "Farm")]
     pub(crate) chunk: ChunkLength,
-    /// Wanted time of a task, minutes.
+    /// Target time of a task, minutes.
     #[arg(long, value_name = "N", default_value = "30", value_parser = clap::value_parser!(u32).range(1..=10_080), help_heading = "Farm")]
     pub(crate) task_minutes: u32,
-    /// Split each picture into so many tiles, a task each, which the last job joins.
+    /// Split each picture into this many tiles. Each tile is a task, and the last job joins them.
     #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = values::parse_grid, conflicts_with = "crop", help_heading = "Farm")]
     pub(crate) tiles: [usize; 2],
     #[command(flatten)]
@@ -79,7 +79,7 @@ pub(crate) struct SlurmArgs {
     /// Another option of `sbatch` for all jobs, such as `--sbatch=--account=films`. May be repeated.
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true, help_heading = "Farm")]
     pub(crate) sbatch: Vec<String>,
-    /// Largest number of tasks of an array. [default: MaxArraySize of the cluster; 1001 where it cannot be asked]
+    /// Largest number of tasks of an array. [default: MaxArraySize of the cluster; 1001 if the cluster cannot be queried]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4_000_001), help_heading = "Farm")]
     pub(crate) max_array_size: Option<u32>,
     /// The program on the machines of the cluster. [default: the path of this one]
@@ -123,10 +123,10 @@ pub(crate) struct OpenjdArgs {
     /// Frames of a chunk; schedulers may adapt it.
     #[arg(long, value_name = "N", default_value = "24", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) chunk: u32,
-    /// Wanted time of a chunk, minutes.
+    /// Target time of a chunk, minutes.
     #[arg(long, value_name = "N", default_value = "30", value_parser = clap::value_parser!(u32).range(1..=10_080))]
     pub(crate) task_minutes: u32,
-    /// Split each picture into so many tiles, a task each, which the last step joins.
+    /// Split each picture into this many tiles. Each tile is a task, and the last step joins them.
     #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = values::parse_grid)]
     pub(crate) tiles: [usize; 2],
     #[command(flatten)]
@@ -170,7 +170,7 @@ impl ProductArgs {
 pub(crate) struct FinishArgs {
     #[command(flatten)]
     pub(crate) render: RenderArgs,
-    /// Join so many tiles of each picture.
+    /// Join this many tiles of each picture.
     #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = values::parse_grid, conflicts_with = "crop", help_heading = "Farm")]
     pub(crate) tiles: [usize; 2],
     #[command(flatten)]
@@ -185,7 +185,7 @@ pub(crate) struct SnapshotsArgs {
     /// Frames of a chunk, counted from the first frame of the scene.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), requires = "snapshots", help_heading = "Farm")]
     pub(crate) chunk: u32,
-    /// The pictures are drawn as so many tiles.
+    /// Columns and rows of the tiles in which each picture is drawn.
     #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = values::parse_grid, conflicts_with = "crop", help_heading = "Farm")]
     pub(crate) tiles: [usize; 2],
 }
@@ -198,7 +198,7 @@ pub(crate) struct TileArgs {
     /// Columns and rows of the tiles of a picture.
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = values::parse_grid, conflicts_with = "crop", help_heading = "Farm")]
     pub(crate) tiles: [usize; 2],
-    /// Number of the tile, row by row from 0 on.
+    /// Number of the tile, counted row by row from 0.
     #[arg(long, value_name = "N", help_heading = "Farm")]
     pub(crate) tile: usize,
 }
@@ -209,16 +209,16 @@ pub(crate) struct CheckMachineArgs {
     /// The output of the frames.
     #[arg(short, long, value_name = "PATH")]
     pub(crate) out: PathBuf,
-    /// The word by which machines recognize the folder of the frames.
-    #[arg(long, value_name = "WORD")]
+    /// The token by which machines recognize the folder of the frames.
+    #[arg(long, value_name = "TOKEN")]
     pub(crate) token: String,
     /// The program and its version.
     #[arg(long, value_name = "PROGRAM")]
     pub(crate) made_by: String,
-    /// Digest of what the arithmetic of the machine gives that made the template.
+    /// Digest of results of the arithmetic of the machine that wrote the template.
     #[arg(long, value_name = "DIGEST")]
     pub(crate) arithmetic: String,
-    /// Leave the word, for the other machines.
+    /// Write the token to the folder, for the other machines.
     #[arg(long)]
     pub(crate) leave_token: bool,
 }
@@ -240,7 +240,7 @@ pub(crate) struct TaskArgs {
 pub(crate) enum TaskCommand {
     /// Check that this machine may take part: it sees the same folder, runs the same version, and gives the same bytes.
     Check,
-    /// Leave snapshots at the beginning of chunks.
+    /// Write snapshots at the beginning of chunks.
     Snapshots {
         /// The frame at which the last of these chunks is cut.
         #[arg(long, value_name = "FRAME", allow_hyphen_values = true)]

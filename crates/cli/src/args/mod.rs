@@ -57,7 +57,7 @@ pub(crate) enum Command {
     Schema,
     /// Draw a scene to pictures, a video, or a contact sheet.
     Render(RenderArgs),
-    /// Draw a shot on many machines, by the batch system that they have.
+    /// Draw a shot on many machines with their batch system.
     Farm(FarmArgs),
     /// Draw a scene as a flipbook for game engines: color, alpha and motion sheets, and a JSON file.
     Flipbook(FlipbookArgs),

@@ -93,8 +93,8 @@ pub(crate) struct BlackBodyArgs {
     /// Between two rows of the table.
     #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true, value_parser = parse_step)]
     pub(crate) step: f64,
-    /// Write a texture instead, without axes: a .png that is one pixel high, with one pixel for each row of the table. The brightest channel of
-    /// each color is full, negative values are 0, and bodies below 1e-6 cd/m^2 are black.
+    /// Write a texture instead, without axes: a .png that is one pixel high, with one pixel for each row of the table. Each color is
+    /// scaled so that its brightest channel is 1; negative values are 0, and bodies below 1e-6 cd/m^2 are black.
     #[arg(long, value_name = "ENCODING")]
     pub(crate) texture: Option<ColorTexture>,
     #[command(flatten)]
@@ -212,7 +212,7 @@ pub(crate) struct EmissionArgs {
     /// Energy flux of the electrons, mW/m^2.
     #[arg(long, value_name = "FLUX", default_value = "10", allow_hyphen_values = true, value_parser = parse_flux)]
     pub(crate) flux_mw_per_m2: f64,
-    /// How the energies are spread.
+    /// Distribution of the energies.
     #[arg(long, default_value = "gaussian", value_parser = spectrum_parser())]
     pub(crate) spectrum: SpectrumShape,
     #[command(flatten)]
@@ -231,7 +231,7 @@ pub(crate) struct DepositionArgs {
         value_parser = parse_energies
     )]
     pub(crate) energies_ev: Numbers,
-    /// How the energies are spread.
+    /// Distribution of the energies.
     #[arg(long, default_value = "monoenergetic", value_parser = spectrum_parser())]
     pub(crate) spectrum: SpectrumShape,
     #[command(flatten)]

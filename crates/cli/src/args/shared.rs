@@ -47,7 +47,7 @@ pub(crate) enum ProgressKind {
     /// A bar on stderr with frame rate and remaining time, if stderr is a terminal; then one line.
     #[default]
     Bar,
-    /// One JSON object a line on stdout: start, frame, stats with `--stats`, done, error.
+    /// One JSON object per line on stdout: start, frame, stats with `--stats`, done, error.
     Json,
     /// Only warnings and errors.
     None,

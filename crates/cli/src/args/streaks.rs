@@ -52,7 +52,7 @@ pub(crate) struct StreaksArgs {
     /// Terminal velocity of drops: as measured by Gunn and Kinzer, or by the paper's formula for a rigid sphere.
     #[arg(long, default_value = "gunn_kinzer", value_parser = values::velocity_parser())]
     terminal_velocity: VelocityLaw,
-    /// Opacity of streaks: the fraction of the exposure during which the drop covers a point, or the paper's 2 D / v for lines of even opacity.
+    /// Opacity of streaks: the fraction of the exposure during which the drop covers a point, or the paper's 2 D / v for lines of uniform opacity.
     #[arg(long, default_value = "exposure_fraction", value_parser = values::opacity_parser())]
     opacity: OpacityLaw,
     /// Sample the diameter of each drop within its bin, from the drop size distribution.
