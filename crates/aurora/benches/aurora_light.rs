@@ -2,19 +2,17 @@
 
 use std::hint::black_box;
 
-use bansho_base::math::random::Key;
-
 use bansho_aurora::physics::{
     atmosphere::atmosphere,
     emission::{Emission, excitation::photons_per_ion_pair},
     precipitation::{
         TrackLibrary, TrackSampler,
         electron_track::TRACKS_PER_ENERGY,
-        energy_grid::{self, node_energy_ev},
+        energy_grid::{self, ARC, node_energy_ev},
         fang2010::{AirLayer, MonoenergeticBeam},
-        spectrum::ARC,
     },
 };
+use bansho_base::math::random::Key;
 use criterion::{Criterion, criterion_group, criterion_main};
 
 const PARTICLES: u64 = 1000;

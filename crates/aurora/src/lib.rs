@@ -35,16 +35,16 @@
 //! | (2.22) | probability of a collision | [`HardSphereAtmosphere::track`](physics::precipitation::HardSphereAtmosphere::track) |
 //! | (2.23) | step in the picture, replaced by the projection of every collision | `render::project::altitude_polynomial::RowPolynomials::points` |
 //! | (2.24) | next position, deflected by a collision | `physics::precipitation::electron_track::TrackState::advance` |
-//! | (2.25) | probability of quenching | [`hard_sphere_quenching`](physics::emission::collisions::hard_sphere_quenching), [`radiated_fraction`](physics::emission::quenching::radiated_fraction) |
-//! | (2.26) | mean thermal speed | [`thermal_speed`](physics::emission::collisions::thermal_speed) |
-//! | (2.27) | attenuation by distance, by default replaced by the extinction of the lower atmosphere | `physics::attenuation_by_distance::AttenuationByDistance`, [`Extinction::transmittance`](physics::extinction::Extinction::transmittance) |
+//! | (2.25) | probability of quenching | [`hard_sphere_quenching`](physics::emission::excitation::hard_sphere_quenching), [`radiated_fraction`](physics::emission::quenching::radiated_fraction) |
+//! | (2.26) | mean thermal speed | [`thermal_speed`](physics::emission::excitation::thermal_speed) |
+//! | (2.27) | attenuation by distance, by default replaced by the extinction of the lower atmosphere | `physics::extinction::AttenuationByDistance`, [`Extinction::transmittance`](physics::extinction::Extinction::transmittance) |
 //! | (2.28) | Gaussian blur in the picture | `render::single_collisions::blur::BlurKernel::new`, `render::single_collisions::blur::BlurredImage::new` |
-//! | (2.29) | XYZ of spectral lines | `physics::emission::emitter::absolute_xyz`, `physics::emission::table_2_1::srgb` |
-//! | (2.30) | XYZ to RGB, by default ACEScg | `physics::emission::table_2_1::srgb`, [`ACESCG_FROM_XYZ`](bansho_base::color::space::ACESCG_FROM_XYZ) |
+//! | (2.29) | XYZ of spectral lines | `physics::emission::emitter::absolute_xyz`, `physics::emission::emitter::table_2_1_srgb` |
+//! | (2.30) | XYZ to RGB, by default ACEScg | `physics::emission::emitter::table_2_1_srgb`, [`ACESCG_FROM_XYZ`](bansho_base::color::space::ACESCG_FROM_XYZ) |
 //! | section 2.2.2 | in-between shapes by cubic splines | [`Sequence::at`](shapes::Sequence::at) |
 //! | section 2.3.3 | limit of the speed by conservation of energy | `simulate::forces::Integrator::energy_limit_factor` |
 //! | section 2.3.4, table 3.3 | births and deaths of particles | `simulate::relocation::Relocation::relocate` |
-//! | section 2.4.2 | species by number density, line by production rate | [`mean_hard_sphere_photons`](physics::emission::collisions::mean_hard_sphere_photons) |
+//! | section 2.4.2 | species by number density, line by production rate | [`mean_hard_sphere_photons`](physics::emission::excitation::mean_hard_sphere_photons) |
 //! | Fang et al. (1) to (5) | ionization by altitude and energy | [`MonoenergeticBeam::ionization`](physics::precipitation::fang2010::MonoenergeticBeam::ionization) |
 //!
 //! # Data flow

@@ -14,8 +14,7 @@ use crate::physics::{
     extinction::Extinction,
     precipitation::{
         HardSphereParameters, Spectrum, TrackModel,
-        energy_grid::{HIGHEST_EV, LOWEST_EV},
-        spectrum::ARC,
+        energy_grid::{ARC, HIGHEST_EV, LOWEST_EV},
     },
 };
 

@@ -8,7 +8,7 @@ use super::{
     emission::{Emission, LINES, SpectralEmitter},
     precipitation::Spectrum,
 };
-use crate::physics::precipitation::spectrum::ARC;
+use crate::physics::precipitation::energy_grid::ARC;
 
 /// 427.8 nm brightness for the column ionization of Fang et al., R per mW m^-2, by energy in keV: pairs times the
 /// fraction of N2+(B) times the band's branching ratio.

@@ -1,7 +1,6 @@
 //! The physics of auroral light: the atmosphere, where electrons spend their energy, and what the struck atoms emit.
 
 pub mod atmosphere;
-pub(crate) mod attenuation_by_distance;
 pub mod calibration;
 pub mod emission;
 pub mod extinction;

@@ -9,7 +9,7 @@ use fearless_simd::dispatch;
 use crate::{
     render::{
         project::field_lines::{EARTH_RADIUS_KM, FOOT_ALTITUDE_KM},
-        shade::attenuation::EmitterColors,
+        shade::EmitterColors,
     },
     simulate::AuroraSimulation,
 };

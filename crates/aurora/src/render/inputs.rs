@@ -6,14 +6,12 @@ use bansho_base::math::{DVec3, random::Key};
 
 use crate::{
     parameters::{AuroraParameters, RenderingParameters, Sampling},
-    physics::{
-        attenuation_by_distance::AttenuationByDistance, emission::Emission, precipitation::energy_grid::HIGHEST_EV,
-    },
+    physics::{emission::Emission, extinction::AttenuationByDistance, precipitation::energy_grid::HIGHEST_EV},
     render::{
-        bin::sources::{EmissionInputs, nearest_node},
-        integrate::{chart_memory::ChartMemory, emission_profile::EmissionProfiles},
+        bin::{EmissionInputs, nearest_node},
+        integrate::{column_buffer::ChartMemory, emission_profile::EmissionProfiles},
         project::field_lines::FieldLines,
-        shade::attenuation::EmitterColors,
+        shade::EmitterColors,
         single_collisions::collision_pass::CollisionRenderer,
     },
     simulate::AuroraSimulation,

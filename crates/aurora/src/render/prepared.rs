@@ -25,14 +25,13 @@ use crate::{
     physics::emission::{PerEmitter, SpectralEmitter},
     render::{
         aovs::{BRIGHTNESSES, CellMaps, brightnesses},
-        bin::{source_bins::SortedSources, sources::Sources},
-        integrate::columns::ColumnBuffer,
+        bin::{Sources, source_bins::SortedSources},
+        integrate::column_buffer::ColumnBuffer,
         project::{
-            chart::{BLOCK_COLUMNS, Chart, Coverage},
+            chart::{BLOCK_COLUMNS, Chart, Coverage, PIXEL_BATCH, PixelBatch},
             field_lines::{EARTH_RADIUS_KM, FieldLines},
-            pixel_batch::{PIXEL_BATCH, PixelBatch},
         },
-        shade::{attenuation::EmitterColors, chart_sampler::ChartSampler},
+        shade::{ChartSampler, EmitterColors},
         single_collisions::{blur::BlurredImage, collision_block::COLLISION_BLOCK_COLUMNS},
     },
     simulate::AuroraSimulation,

@@ -7,7 +7,7 @@ use bansho_base::{
 
 use crate::{
     render::{
-        bin::sources::{SampleTimes, Sources},
+        bin::{SampleTimes, Sources},
         inputs::emission_inputs,
         project::field_lines::FieldLines,
     },

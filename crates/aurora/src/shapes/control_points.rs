@@ -11,11 +11,8 @@ use super::{
         time_warping::warp_through,
     },
     geometry::polyline::{Polyline, length_fractions, line_length},
-    interpolation::{
-        gap::Gap,
-        spline_track::{ControlPointTrack, Knot},
-    },
-    strokes::validate::{DrawnSheet, ShapeContext, drawn_sheets},
+    interpolation::{ControlPointTrack, Gap, Knot},
+    strokes::{DrawnSheet, ShapeContext, drawn_sheets},
 };
 
 /// Control points closer than this coincide, km.

@@ -18,19 +18,16 @@ pub(crate) mod strokes;
 
 pub use error::{ShapeError, ShapeErrorKind};
 pub use form::Form;
+pub use geometry::nearest_segment::NearestSegmentGrid;
 pub(crate) use geometry::polyline::{cumulative_lengths, line_length};
-pub use geometry::{
-    nearest_segment::NearestSegmentGrid,
-    segments::{SheetSample, SheetSampler},
-};
-pub use interpolation::gap::{Bridge, SheetEnd};
+pub use interpolation::{Bridge, SheetEnd};
 pub use parameters::{
     Correspondence, FRAME_S, GapLight, LinkParameters, MergeParameters, MorphingParameters, ShapeParameters,
     SheetParameters, Spacing, SplitParameters,
 };
 pub(crate) use sequence::ControlPointIds;
 pub use sequence::Sequence;
-pub use shape::{SegmentId, Shape, Sheet};
+pub use shape::{SegmentId, Shape, Sheet, SheetSample, SheetSampler};
 pub use strokes::intersection::{count_crossings, first_crossing};
 
 /// Altitude of the drawn plane, km.

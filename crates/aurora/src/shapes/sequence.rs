@@ -11,10 +11,7 @@ use super::{
 };
 use crate::shapes::{
     control_points::{TrackedControlPoints, drawn_shapes, track_control_points},
-    interpolation::{
-        gap::{self, Bridge, Gap, GapFlux, SheetEnd},
-        spline_track::{Knot, ShapeTiming, find_velocities},
-    },
+    interpolation::{self, Bridge, Gap, GapFlux, Knot, ShapeTiming, SheetEnd, find_velocities},
     strokes::intersection::passes,
 };
 
@@ -147,7 +144,7 @@ impl Sequence {
         for gap in faded {
             let (state, _) = self.gap(gap, index, fraction);
             for SheetEnd { sheet, is_end } in gap.ends.iter().filter_map(|end| self.end(*end, index)) {
-                gap::fade_toward_gap(&mut shape.sheets[sheet], is_end, state.ends);
+                interpolation::fade_toward_gap(&mut shape.sheets[sheet], is_end, state.ends);
             }
         }
         shape

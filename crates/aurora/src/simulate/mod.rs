@@ -10,7 +10,6 @@ pub mod field;
 mod forces;
 mod neighbor_cells;
 mod particles;
-pub(crate) mod point_cloud;
 mod relocation;
 pub(crate) mod sheets;
 mod simulation;

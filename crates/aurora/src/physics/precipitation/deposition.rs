@@ -3,9 +3,8 @@
 use bansho_base::{host::parallel::prelude::*, math::lerp};
 
 use super::{
-    energy_grid::{self, NODES, node_energy_ev},
+    energy_grid::{self, NODES, Spectrum, node_energy_ev},
     fang2010::{AirLayer, MonoenergeticBeam},
-    spectrum::Spectrum,
 };
 use crate::physics::atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, locate_level};
 
@@ -158,7 +157,7 @@ mod tests {
     use super::*;
     use crate::physics::{
         atmosphere::{atmosphere, level_altitude_km},
-        precipitation::spectrum::ARC,
+        precipitation::energy_grid::ARC,
     };
 
     fn peak_km(profile: &AltitudeProfile) -> f64 {

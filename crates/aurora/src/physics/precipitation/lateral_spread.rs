@@ -11,9 +11,8 @@ use bansho_base::{
 use super::{
     Deposition,
     electron_track::{Collision, TrackSampler, collision_count},
-    energy_grid::{self, NODES, node_energy_ev},
+    energy_grid::{self, ARC, NODES, node_energy_ev},
     hard_sphere::HardSphereAtmosphere,
-    spectrum::ARC,
 };
 use crate::physics::atmosphere::atmosphere;
 

@@ -1,9 +1,8 @@
 //! Precipitation: where electrons lose their energy in the atmosphere.
 //!
-//! [`fang2010`] has the altitude profiles by energy, [`energy_grid`] the energies of all tables, [`spectrum`] the
-//! energy spectra, [`deposition`] the ionization table, [`electron_track`] tracks of single collisions whose mean is
-//! the table. [`hard_sphere`] is the model of the thesis, [`quantile_matched`] a few of its tracks adjusted to have the
-//! mean of all.
+//! [`fang2010`] has the altitude profiles by energy, [`energy_grid`] the energies of all tables and the spectra on them,
+//! [`deposition`] the ionization table, [`electron_track`] tracks of single collisions whose mean is the table. [`hard_sphere`] is
+//! the model of the thesis, with a few tracks adjusted to have the mean of all.
 
 pub mod deposition;
 pub mod electron_track;
@@ -11,13 +10,11 @@ pub mod energy_grid;
 pub mod fang2010;
 pub mod hard_sphere;
 pub(crate) mod lateral_spread;
-pub mod quantile_matched;
-pub mod spectrum;
 
 pub use deposition::Deposition;
 pub use electron_track::{Collision, TrackLibrary, TrackSampler};
+pub use energy_grid::Spectrum;
 pub use hard_sphere::{HardSphereAtmosphere, HardSphereParameters};
-pub use spectrum::Spectrum;
 
 bansho_base::choice! {
     /// Model of the energy loss of the electrons and of the light that they excite.

@@ -4,16 +4,14 @@ use std::sync::OnceLock;
 
 use bansho_base::math;
 
-use crate::{
-    physics::attenuation_by_distance::AttenuationByDistance,
-    physics::{
-        atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
-        emission::{
-            EMITTERS, Emission, PHOTONS_PER_KILORAYLEIGH, PerEmitter, SpectralEmitter,
-            red_line_altitudes::{RED_ALTITUDES, red_by_altitude},
-        },
-        precipitation::energy_grid::NODES,
+use crate::physics::{
+    atmosphere::{HIGHEST_KM, LEVELS, LOWEST_KM, level_altitude_km},
+    emission::{
+        EMITTERS, Emission, PHOTONS_PER_KILORAYLEIGH, PerEmitter, SpectralEmitter,
+        quenching::{RED_ALTITUDES, red_by_altitude},
     },
+    extinction::AttenuationByDistance,
+    precipitation::energy_grid::NODES,
 };
 
 /// Tables per node of the energy grid: the nearest is within 0.5 % of the energy, and the red column, which varies
@@ -246,11 +244,11 @@ pub(super) const BOTTOM_KM: f32 = LOWEST_KM as f32;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::{atmosphere::atmosphere, emission::table, precipitation::spectrum::ARC};
+    use crate::physics::{atmosphere::atmosphere, precipitation::energy_grid::ARC};
 
     #[test]
     fn every_table_of_an_energy_holds_the_same_column() {
-        let table = table::Emission::new(atmosphere(), ARC);
+        let table = Emission::new(atmosphere(), ARC);
         let profiles = EmissionProfiles::new(&table, &AttenuationByDistance::default());
         for node in [20.0, 48.0, 60.25] {
             let profile = profiles.at(node, true);
@@ -269,8 +267,7 @@ mod tests {
 
     #[test]
     fn hard_electrons_stop_lower() {
-        let profiles =
-            EmissionProfiles::new(&table::Emission::new(atmosphere(), ARC), &AttenuationByDistance::default());
+        let profiles = EmissionProfiles::new(&Emission::new(atmosphere(), ARC), &AttenuationByDistance::default());
         assert!(profiles.at(64.0, false).top_km < profiles.at(32.0, false).top_km);
         assert!(profiles.at(48.0, true).top_km > 300.0);
     }

@@ -1,14 +1,14 @@
-//! The chart: the visible part of the sky in longitude and colatitude about the magnetic zenith.
+//! The chart: the visible part of the sky in longitude and colatitude about the magnetic zenith, and where batches of pixels lie on it.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use bansho_base::{
-    camera::Camera,
-    math::{self, DVec2, MulAdd},
+    camera::{Camera, directions::Directions},
+    math::{self, DVec2, MulAdd, approximations},
     phenomenon::strip::View,
 };
 
-use super::field_lines::FieldLines;
+use super::field_lines::{FieldLines, dot};
 
 /// Columns per block. Blocks are the unit of work of a thread.
 pub(crate) const BLOCK_COLUMNS: usize = 16;
@@ -236,6 +236,42 @@ impl ChartProjection {
     #[inline(always)]
     pub(crate) fn row(&self, colatitude: f32) -> f32 {
         colatitude.fma(self.per_row, -self.first_row)
+    }
+}
+
+/// Pixels per batch.
+pub(crate) const PIXEL_BATCH: usize = 16;
+
+/// Directions of a batch of pixels in the field frame.
+#[derive(Default)]
+pub(crate) struct PixelBatch {
+    /// Colatitude and longitude about the magnetic zenith.
+    pub(crate) colatitude: [f32; PIXEL_BATCH],
+    pub(crate) longitude: [f32; PIXEL_BATCH],
+    /// Sine of the elevation.
+    pub(crate) sine: [f32; PIXEL_BATCH],
+    /// Length of the direction that [`Camera::direction`] gives.
+    pub(crate) length: [f32; PIXEL_BATCH],
+    /// Whether the lens maps the pixel to a direction.
+    pub(crate) in_view: [bool; PIXEL_BATCH],
+}
+
+impl PixelBatch {
+    /// Pixels from `x` on in row `y`.
+    #[inline(always)]
+    pub(crate) fn new(camera: &Camera, field: &FieldLines, x: usize, y: usize) -> Self {
+        let mut directions = Directions::new(camera, x, y);
+        let mut batch = Self { length: directions.normalize(), in_view: directions.visible, ..Self::default() };
+        let [xs, ys, zs] = directions.components;
+        let [along, first, second] = field.axes_f32();
+        for i in 0..PIXEL_BATCH {
+            let direction = [xs[i], ys[i], zs[i]];
+            let (x, y) = (dot(first, direction), dot(second, direction));
+            batch.colatitude[i] = approximations::atan2(x.fma(x, y * y).sqrt(), dot(along, direction));
+            batch.longitude[i] = approximations::atan2(y, x);
+        }
+        batch.sine = ys;
+        batch
     }
 }
 

@@ -3,5 +3,4 @@
 pub(crate) mod altitude_polynomial;
 pub(crate) mod chart;
 pub(crate) mod field_lines;
-pub(crate) mod pixel_batch;
 pub(crate) mod visible_rows;

@@ -17,10 +17,10 @@ use crate::{
     physics::emission::{EMITTERS, PerEmitter, SpectralEmitter},
     render::{
         project::{
+            chart::{PIXEL_BATCH, PixelBatch},
             field_lines::FieldLines,
-            pixel_batch::{PIXEL_BATCH, PixelBatch},
         },
-        shade::chart_sampler::ChartSampler,
+        shade::ChartSampler,
     },
 };
 

@@ -8,7 +8,7 @@ use fearless_simd::Simd;
 use super::rasterize::{QUAD_ROWS, RowQuad, TrackRasterizer};
 use crate::render::{
     bin::source_bins::{BlockEntry, FieldLineSource, SortedSources},
-    integrate::columns::ColumnBlock,
+    integrate::column_buffer::ColumnBlock,
     project::{
         altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials},
         chart::{BLOCK_COLUMNS, Chart, ChartProjection},

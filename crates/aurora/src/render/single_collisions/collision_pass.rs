@@ -25,20 +25,19 @@ use super::{
 use crate::{
     physics::{
         atmosphere::atmosphere,
-        attenuation_by_distance::AttenuationByDistance,
         emission::{Emission, PerEmitter},
+        extinction::AttenuationByDistance,
         precipitation::{
             Deposition,
             electron_track::{Collision, TrackLibrary, TrackSampler},
             energy_grid::{NODES, node_energy_ev},
-            hard_sphere::HardSphereAtmosphere,
-            quantile_matched::QuantileMatchedTracks,
+            hard_sphere::{HardSphereAtmosphere, QuantileMatchedTracks},
         },
     },
     render::{
         RenderingParameters, TrackModel,
         bin::source_bins::{FieldLineSource, PatchWeights, REACH, SortedSources},
-        integrate::columns::{ColumnBlock, ColumnBuffer},
+        integrate::column_buffer::{ColumnBlock, ColumnBuffer},
         project::{
             altitude_polynomial::{ProjectedFieldLine, RowPolynomialBasis, RowPolynomials, altitudes_km},
             chart::{BLOCK_COLUMNS, Chart, ChartProjection},

@@ -29,21 +29,20 @@ use crate::{
     Aurora, AuroraParameters, AuroraRun, ParticleParameters, SpectrumShape,
     physics::{
         atmosphere::{LEVELS, atmosphere, level_altitude_km},
-        attenuation_by_distance::AttenuationByDistance,
         emission::{EMITTERS, Emission, LineSet, PHOTONS_PER_KILORAYLEIGH, PerEmitter, SpectralEmitter},
-        precipitation::spectrum::ARC,
+        extinction::AttenuationByDistance,
+        precipitation::energy_grid::ARC,
     },
     render::{
         aovs::{brightnesses, measured_lines},
         bin::{
+            EmitterWeights, SourceBuilder, Sources, nearest_node,
             source_bins::{FieldLineSource, REACH, SortedSources},
-            sources::{EmitterWeights, SourceBuilder, Sources, nearest_node},
         },
-        integrate::{columns::ColumnBuffer, emission_profile::EmissionProfiles},
+        integrate::{column_buffer::ColumnBuffer, emission_profile::EmissionProfiles},
         project::{
-            chart::{BLOCK_COLUMNS, Chart, Coverage},
+            chart::{BLOCK_COLUMNS, Chart, Coverage, PixelBatch},
             field_lines::{EARTH_RADIUS_KM, FieldLines},
-            pixel_batch::PixelBatch,
         },
         single_collisions::{
             blur::BlurredImage, collision_block::COLLISION_BLOCK_COLUMNS, collision_pass::CollisionRenderer,

@@ -6,8 +6,7 @@ use super::{
     time_warping::Anchor,
 };
 use crate::shapes::{
-    LinkParameters, ShapeError, ShapeErrorKind, geometry::polyline::length_fractions,
-    interpolation::spline_track::ControlPointTrack,
+    LinkParameters, ShapeError, ShapeErrorKind, geometry::polyline::length_fractions, interpolation::ControlPointTrack,
 };
 
 /// Minimum distance of a linked point from the ends of its sheet, as a fraction of the length: ends are matched to

@@ -1,6 +1,5 @@
 //! Correspondence of sheets and control points between successive shapes.
 
-pub(crate) mod hungarian;
 pub(crate) mod links;
 pub(crate) mod sheet_matching;
 pub(crate) mod split_merge;

@@ -5,10 +5,7 @@ use bansho_base::{math::DVec2, parameters::Auto};
 use crate::shapes::{
     MergeParameters, ShapeError, ShapeErrorKind, ShapeParameters, SplitParameters,
     geometry::polyline::length_fractions,
-    interpolation::{
-        gap::Gap,
-        spline_track::{ControlPointTrack, Parents},
-    },
+    interpolation::{ControlPointTrack, Gap, Parents},
 };
 
 /// A strand within a chain of strands that merge.
@@ -346,7 +343,7 @@ impl Chains {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shapes::interpolation::spline_track::Knot;
+    use crate::shapes::interpolation::Knot;
 
     /// Sheets of 4 points along x, 1 km apart, at z = 0, 10, ...
     fn setting(count: usize) -> (Vec<Vec<usize>>, Vec<ControlPointTrack>) {

@@ -3,4 +3,3 @@
 pub(crate) mod cell_grid;
 pub(crate) mod nearest_segment;
 pub(crate) mod polyline;
-pub(crate) mod segments;

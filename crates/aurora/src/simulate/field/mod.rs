@@ -4,7 +4,6 @@ mod grid;
 mod poisson;
 pub(crate) mod sheet_charge;
 pub(crate) mod sheet_field;
-mod sine_transform;
 
 pub use grid::{Gradient2, Grid2};
 pub use poisson::{PoissonSolver, gauss_seidel_sweep, relative_residual};

@@ -1,24 +1,174 @@
-//! Composites the sharp and the soft chart, applies extinction and converts to color, so that a pixel samples one
-//! chart.
+//! From charts to pixels: the sharp and the soft chart are composited, so that a pixel samples one chart; extinction is applied, and kilorayleighs become
+//! color.
+
+use std::f64::consts::FRAC_PI_2;
 
 use bansho_base::{
     host::{parallel::prelude::*, scratch_pool::ScratchPool},
-    math,
-    math::simd::{FourLanes, HalfLanes, Real},
+    math::{
+        self, DVec3,
+        simd::{FourLanes, HalfLanes, Real},
+    },
 };
 use fearless_simd::{Simd, dispatch, prelude::*};
 
-use super::attenuation::EmitterColors;
-use crate::{
-    physics::emission::PerEmitter,
-    render::{
-        integrate::columns::{ColumnBlock, ColumnBuffer, lerp_emitters},
-        project::{
-            chart::{BLOCK_COLUMNS, Chart, ChartProjection},
-            field_lines::FieldLines,
-        },
+use super::{
+    RenderingParameters,
+    integrate::column_buffer::{ColumnBlock, ColumnBuffer, lerp_emitters},
+    project::{
+        chart::{BLOCK_COLUMNS, Chart, ChartProjection},
+        field_lines::FieldLines,
     },
 };
+use crate::physics::{
+    emission::{ColorMatching, EMITTERS, LineSet, PerEmitter, SpectralEmitter},
+    extinction::Extinction,
+};
+
+/// Steps from the horizon to the zenith, uniform in the square root of the sine of the elevation: extinction varies
+/// rapidly near the horizon.
+const STEPS: usize = 1024;
+/// Effective wavelength of the visible first positive bands, nm.
+const BANDS_NM: f64 = 655.0;
+
+/// ACEScg of a kilorayleigh of each emitter by elevation; luminance in cd/m^2.
+#[derive(Clone, Debug)]
+pub(crate) struct EmitterColors {
+    /// Red, green, blue, and 1 for emitters that contribute to the brightness, else 0.
+    colors: Vec<PerEmitter<[f32; 4]>>,
+}
+
+impl EmitterColors {
+    /// Precomputes the table for the extinction and the color matching functions of a rendering, and the lines of its emission.
+    pub(crate) fn new(rendering: &RenderingParameters, lines: LineSet) -> Self {
+        let RenderingParameters { extinction: air, color_matching, .. } = rendering;
+        let colors = (0..=STEPS).map(|step| {
+            let root = step as f64 / STEPS as f64;
+            let elevation = math::asin(root * root).min(FRAC_PI_2);
+            EMITTERS.map(|emitter| {
+                let [red, green, blue] =
+                    attenuated_color(emitter, lines, *color_matching, air, elevation).map(|value| value as f32);
+                [red, green, blue, if emitter == SpectralEmitter::Nitrogen { 0.0 } else { 1.0 }]
+            })
+        });
+        Self { colors: colors.collect() }
+    }
+
+    /// Table coordinate of a sine of elevation, clamped at the horizon.
+    #[inline(always)]
+    pub(crate) fn table_coordinate(sine: f32) -> f32 {
+        let clamped = if sine > 0.0 { sine } else { 0.0 };
+        clamped.sqrt().fma(STEPS as f32, 0.5)
+    }
+
+    /// Color of light by emitter in kR at a [`table_coordinate`](Self::table_coordinate); the fourth component is its
+    /// brightness in kR without the dim first positive bands.
+    #[inline(always)]
+    pub(crate) fn attenuated<S: Simd>(&self, simd: S, light: &PerEmitter<f32>, coordinate: f32) -> FourLanes<S> {
+        let mut sum = FourLanes::splat(simd, 0.0);
+        for (light, color) in light.iter().zip(&self.colors[(coordinate as usize).min(STEPS)]) {
+            sum = sum.broadcast(*light).fma(FourLanes::simd_from(simd, *color), sum);
+        }
+        sum
+    }
+}
+
+/// Attenuated color of a kilorayleigh of an emitter, all lines included.
+fn attenuated_color(
+    emitter: SpectralEmitter,
+    lines: LineSet,
+    color_matching: ColorMatching,
+    air: &Extinction,
+    elevation: f64,
+) -> [f64; 3] {
+    if emitter == SpectralEmitter::Nitrogen && lines == LineSet::Observed {
+        let transmittance = air.transmittance(BANDS_NM, elevation);
+        return emitter.color_per_kilorayleigh().map(|value| value * transmittance);
+    }
+    let sum = lines.lines(emitter).into_iter().fold(DVec3::ZERO, |sum, (wavelength_nm, photons)| {
+        let color = DVec3::from(color_matching.line_color(wavelength_nm));
+        sum + color * (photons * air.transmittance(wavelength_nm, elevation))
+    });
+    sum.to_array()
+}
+
+impl ColumnBuffer {
+    /// A sampler of this buffer.
+    pub(crate) fn sampler(&self) -> ChartSampler<'_> {
+        ChartSampler { buffer: self, projection: self.chart.projection() }
+    }
+}
+
+/// A chart and its mapping from directions to cells.
+pub(crate) struct ChartSampler<'a> {
+    buffer: &'a ColumnBuffer,
+    projection: ChartProjection,
+}
+
+impl ChartSampler<'_> {
+    /// Adds the light at directions, bilinear between cells.
+    #[inline(always)]
+    pub(crate) fn add<S: Simd, const COUNT: usize>(
+        &self,
+        simd: S,
+        longitude: &[f32; COUNT],
+        colatitude: &[f32; COUNT],
+        light: &mut [PerEmitter<f32>; COUNT],
+    ) {
+        let last = (self.buffer.chart.rows - 1) as f32;
+        let (mut columns, mut rows) = ([0.0; COUNT], [0.0; COUNT]);
+        for i in 0..COUNT {
+            columns[i] = self.projection.column(longitude[i]) - 0.5;
+            rows[i] = (self.projection.row(colatitude[i]) - 0.5).clamp(0.0, last);
+        }
+        for i in 0..COUNT {
+            self.add_bilinear(simd, columns[i], rows[i], &mut light[i]);
+        }
+    }
+
+    /// The light at one direction.
+    #[cfg(test)]
+    pub(crate) fn light(&self, longitude: f32, colatitude: f32) -> PerEmitter<f32> {
+        let mut light = [[0.0; 4]];
+        dispatch!(bansho_base::math::simd::level(), simd => self.add(simd, &[longitude], &[colatitude], &mut light));
+        light[0]
+    }
+
+    #[inline(always)]
+    fn add_bilinear<S: Simd>(&self, simd: S, column: f32, row: f32, light: &mut PerEmitter<f32>) {
+        let ColumnBuffer { chart, light: all, .. } = self.buffer;
+        let left = column.floor();
+        let across = column - left;
+        let upper = (row as usize).min(chart.rows - 2);
+        let fraction = row - upper as f32;
+        let (left, right) = (chart.wrap_column(left as i32), chart.wrap_column(left as i32 + 1));
+        let [first, end] = self.buffer.valid_rows_of_either([left, right]);
+        if upper as u32 + 1 < first || upper as u32 >= end {
+            return;
+        }
+        // A row and the next one are adjacent in memory.
+        let (left, right) = (left * chart.rows + upper, right * chart.rows + upper);
+        let left = HalfLanes::from_slice(simd, all[left..left + 2].as_flattened());
+        let right = HalfLanes::from_slice(simd, all[right..right + 2].as_flattened());
+        let (above, below) = (left.broadcast(across)).fma(right - left, left).split();
+        *light = above.broadcast(fraction).fma(below - above, above + FourLanes::simd_from(simd, *light)).into();
+    }
+
+    /// Conservative test whether a region between two longitudes, in radians, and two colatitudes is dark.
+    pub(crate) fn is_dark(&self, longitudes: [f32; 2], colatitudes: [f32; 2]) -> bool {
+        let ColumnBuffer { chart, valid_rows, .. } = self.buffer;
+        let [left, right] = longitudes.map(|longitude| self.projection.column(longitude) as i32);
+        // Regions across the seam of a full-circle chart are not tested.
+        if right < left || (right - left) as usize > chart.columns / 2 {
+            return false;
+        }
+        let [top, bottom] = colatitudes.map(|colatitude| (self.projection.row(colatitude).max(0.0)) as u32);
+        (left - 2..=right + 2).all(|column| {
+            let [first, end] = valid_rows[chart.wrap_column(column)];
+            bottom + 2 < first || top >= end + 2
+        })
+    }
+}
 
 /// Rows per batch.
 const ROWS: usize = 16;
@@ -148,15 +298,44 @@ mod tests {
         math::{DVec2, DVec3},
         phenomenon::strip::{Shutter, View},
     };
+    use fearless_simd::dispatch;
 
     use super::*;
     use crate::{
         physics::emission::LineSet,
         render::{
             RenderingParameters,
-            project::{chart::Coverage, pixel_batch::PixelBatch},
+            project::chart::{Coverage, PixelBatch},
         },
     };
+
+    #[test]
+    fn without_air_every_emitter_has_its_own_color() {
+        let none = Extinction { rayleigh: 0.0, aerosol: 0.0, ozone: 0.0, ..Extinction::default() };
+        let rendering = RenderingParameters { extinction: none, ..RenderingParameters::default() };
+        let emitter_colors = EmitterColors::new(&rendering, LineSet::Observed);
+        for emitter in EMITTERS {
+            let mut light = [0.0; 4];
+            light[emitter.index()] = 2.0;
+            let color: [f32; 4] = dispatch!(bansho_base::math::simd::level(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(0.3)).into());
+            let expected = emitter.color_per_kilorayleigh();
+            assert!(
+                (0..3).all(|c| (f64::from(color[c]) - 2.0 * expected[c]).abs() < 1e-4 * expected[1].abs().max(1e-6))
+            );
+        }
+    }
+
+    #[test]
+    fn blue_fades_before_red_toward_the_horizon() {
+        let emitter_colors = EmitterColors::new(&RenderingParameters::default(), LineSet::Observed);
+        let transmittance = |emitter: SpectralEmitter| {
+            let mut light = [0.0; 4];
+            light[emitter.index()] = 1.0;
+            let blue = |sine: f32| dispatch!(bansho_base::math::simd::level(), simd => emitter_colors.attenuated(simd, &light, EmitterColors::table_coordinate(sine))[2]);
+            blue(0.02) / blue(1.0)
+        };
+        assert!(transmittance(SpectralEmitter::NitrogenIon) < 0.5 * transmittance(SpectralEmitter::OxygenGreen).abs());
+    }
 
     /// Light that changes slowly over the sky, on a chart.
     fn painted(chart: Chart, scale: f32) -> ColumnBuffer {

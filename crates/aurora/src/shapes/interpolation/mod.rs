@@ -1,4 +1,0 @@
-//! In-between shapes: splines in time through the key shapes.
-
-pub(crate) mod gap;
-pub(crate) mod spline_track;
