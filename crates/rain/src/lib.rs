@@ -48,7 +48,7 @@
 //!    [`billboards`], drops come from the positions of a streak texture; on the ground `streaks::splashes` adds droplets. With `method = "textures"`,
 //!    [`textured_billboards`] draws the paper's textures instead. [`Rain::drops`] lists the drops as data.
 //! 5. `streaks::bin` sorts packed streaks into tiles of 128 x 8 pixels, in chunks.
-//! 6. `render::prepared` draws a strip tile by tile: `streaks::rasterize` computes the exact coverage of each pixel and composites front to back;
+//! 6. `render` draws a strip tile by tile: `streaks::rasterize` computes the exact coverage of each pixel and composites front to back;
 //!    then `lighting::single_scattering` adds the medium under it.
 
 pub(crate) mod aovs;

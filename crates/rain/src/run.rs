@@ -13,7 +13,7 @@ use bansho_base::{
 };
 
 use super::model::Rain;
-use crate::{lighting::LightCaches, raindrop, render::prepared::PreparedRain};
+use crate::{lighting::LightCaches, raindrop, render::PreparedRain};
 
 /// [`Rain`] during a shot. It can be drawn at any time.
 #[derive(Debug)]

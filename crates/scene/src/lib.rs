@@ -3,7 +3,6 @@
 //! The feature `schema` adds the module `schema`, the JSON schema of scene files.
 
 mod check;
-mod positions;
 pub mod report;
 #[cfg(feature = "schema")]
 pub mod schema;
@@ -26,8 +25,7 @@ use bansho_base::{
 
 pub use self::{
     check::report_build_error,
-    positions::Positions,
-    report::SceneError,
+    report::{Positions, SceneError},
     shared::{SharedInstance, SharedTables},
     tables::{
         depth::{DepthDoubt, DepthFit, DepthScale, DepthValues},

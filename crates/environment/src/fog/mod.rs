@@ -27,10 +27,8 @@ mod light_in_fog;
 mod phenomenon;
 mod render;
 mod scattering;
-mod table;
 
-pub use phenomenon::Fog;
-pub use table::FogParameters;
+pub use phenomenon::{Fog, FogParameters};
 
 #[cfg(test)]
 mod tests;

@@ -15,15 +15,16 @@ use bansho_base::{
 use fearless_simd::{dispatch, prelude::*};
 
 use super::{
+    LakeFrame,
     hits::{HORIZON, Hits},
+    lake::WaveSlopes,
     lighting::array,
-    model::{LakeFrame, sampled},
     parameters::GroundKind,
     row_cache::{GroundLightBatch, KnownRows},
     sample::SampledImage,
+    sampled,
     shade::{PreparedGround, pixel_centers, wet_albedo_factor},
     surface::SurfaceSamples,
-    waves::WaveSlopes,
 };
 
 /// Which of sixteen pixels show ground in a slice.

@@ -21,8 +21,8 @@
 //! | Fresnel reflectance `F = F0 + (1 - F0) (1 - cos)^5`, n = 1.333 | `wet_reflection::fresnel` |
 //! | microfacet reflection `F D G / (4 cos)` | `wet_reflection::Microfacets::specular_lobe` |
 //! | GTR distribution D and Smith masking G | `wet_reflection::gtr3_distribution_with_masking` |
-//! | deep-water waves, `omega^2 = g k` | `waves::Waves::new`, `waves::Waves::slopes` |
-//! | blur by unresolved slopes, `sigma = 2 s f` pixels | `lake_reflection::blurred_reflection` |
+//! | deep-water waves, `omega^2 = g k` | `lake::Waves::new`, `lake::Waves::slopes` |
+//! | blur by unresolved slopes, `sigma = 2 s f` pixels | `lake::blurred_reflection` |
 //!
 //! # Data flow
 //! `Surface` is the pattern of the ground, built once from [`GroundParameters`]: octaves of noise for albedo, puddles
@@ -35,22 +35,85 @@
 
 mod draw;
 mod hits;
-mod lake_reflection;
+mod lake;
 mod lighting;
-mod model;
-mod motion;
 mod parameters;
 mod phenomenon;
 mod row_cache;
 mod sample;
 mod shade;
 mod surface;
-mod table;
-mod waves;
 mod wet_reflection;
-pub use model::Ground;
-pub use parameters::{GroundKind, GroundParameters};
-pub(crate) use phenomenon::height_of_level_ground;
 
 #[cfg(test)]
 mod tests;
+
+use bansho_base::{
+    image::Image,
+    math::{DVec2, random::Key},
+    phenomenon::{
+        strip::View,
+        surroundings::{Reflection, Surroundings},
+    },
+};
+use lake::{WaveParameters, Waves};
+pub use parameters::{GroundKind, GroundParameters};
+pub(crate) use phenomenon::height_of_level_ground;
+use row_cache::GroundRowCache;
+use sample::SampledImage;
+use surface::Surface;
+
+/// The ground of a scene.
+pub struct Ground {
+    parameters: GroundParameters,
+    surface: Surface,
+    key: Key,
+    loop_s: Option<f64>,
+    known_rows: GroundRowCache,
+}
+
+impl Ground {
+    /// The name of its layer.
+    pub const NAME: &str = "ground";
+
+    /// A ground with these parameters.
+    pub fn new(parameters: GroundParameters, seed: u64, loop_s: Option<f64>) -> Self {
+        let key = Key::new(seed, Self::NAME);
+        let surface = Surface::new(&parameters, key);
+        Self { surface, parameters, key, loop_s, known_rows: GroundRowCache::default() }
+    }
+
+    /// The lake in a frame; `None` for other kinds of ground.
+    fn lake<'a>(&self, view: &View, surroundings: &Surroundings<'a>) -> Option<LakeFrame<'a>> {
+        let parameters = &self.parameters;
+        let reflection = surroundings.reflection.filter(|_| parameters.kind == GroundKind::Water)?;
+        let t = view.shutter.middle();
+        // Waves that turned with a wind that changes during the shot would jump.
+        let wind = surroundings.wind.planned_mean(t);
+        let waves = WaveParameters {
+            key: self.key,
+            slope: parameters.waves,
+            longest: parameters.wave_length,
+            heading: DVec2::new(wind.x, wind.z).try_normalize().unwrap_or(DVec2::X),
+            loop_s: self.loop_s,
+        };
+        let origin = DVec2::new(view.camera.position.x, view.camera.position.z);
+        let blurred_reflection = lake::blurred_reflection(sampled(reflection), view, parameters.waves);
+        Some(LakeFrame { waves: Waves::new(&waves, t, origin), reflection, blurred_reflection })
+    }
+}
+
+/// A lake in one frame.
+struct LakeFrame<'a> {
+    /// The waves around the point below the camera.
+    waves: Waves,
+    reflection: &'a Reflection,
+    /// The reflection, blurred by waves too short to be resolved, with the same pixels and rows.
+    blurred_reflection: Image<4>,
+}
+
+/// The picture of a mirror for positions in pixels of the view.
+fn sampled(reflection: &Reflection) -> SampledImage<'_> {
+    let Reflection { image, pixel_size, first_row } = reflection;
+    SampledImage { image, pixel_size: *pixel_size, first_row: *first_row }
+}

@@ -18,9 +18,9 @@ use bansho_base::{
 use fearless_simd::prelude::*;
 
 use super::{
+    LakeFrame,
     hits::{Hits, RowDepths},
     lighting::{GroundLight, Shadows, array},
-    model::LakeFrame,
     parameters::{GroundKind, GroundParameters},
     row_cache::{GroundLightBatch, KnownRows},
     sample::SampledImage,

@@ -1,18 +1,20 @@
-//! `impl Phenomenon`: how the renderer uses lamps.
+//! The table `[[light]]`, and how the renderer uses lamps (`impl Phenomenon`).
 
 use std::sync::Arc;
 
 use bansho_base::{
     host::observer::{Cancelled, Observer},
+    parameters::{BuildError, ProblemKind},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
         strip::{DepthInterval, Shutter, View},
-        surroundings::{Publication, Surroundings},
+        surroundings::{Light, Publication, Surroundings},
     },
+    tables::{BuildContext, BuiltTable, SharedRole, SharedTable, TableCount, TableKind},
 };
 
 use super::{
-    model::Lamps,
+    Lamp, Lamps, LightKind, LightParameters,
     render::{Disc, PreparedLamps, has_glare, project_lamp},
 };
 
@@ -63,4 +65,71 @@ impl Run for Lamps {
         discs.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         Ok(Box::new(PreparedLamps { view, discs }))
     }
+}
+
+impl LightParameters {
+    /// The table `[[light]]`.
+    pub const KIND: TableKind = TableKind {
+        layer: Some(Lamps::NAME),
+        ..TableKind::shared::<Self>(
+            "light",
+            TableCount::List,
+            SharedRole {
+                draw: Some(draw),
+                draw_order: 10,
+                fingerprint_order: 10,
+                implied_unless: Some(&["sky", "ground"]),
+                ..SharedRole::new::<Self>()
+            },
+        )
+    };
+}
+
+impl SharedTable for LightParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
+
+    /// A directed light needs a direction, and the inner cone of a spot must not exceed its outer cone. An inner cone that the file does not state is
+    /// limited to the outer one.
+    fn conflicts(&self, is_stated: &dyn Fn(&str) -> bool) -> Vec<BuildError> {
+        let mut errors = Vec::new();
+        if self.is_directed() && !self.has_valid_direction() {
+            let reason = "is the zero vector; allowed: a vector with at least one nonzero component".to_owned();
+            errors.push(BuildError { key: "direction".into(), kind: ProblemKind::Conflict(reason) });
+        }
+        let is_wider = self.inner_cone_deg > self.outer_cone_deg;
+        if self.kind == LightKind::Spot && is_wider && is_stated("inner_cone_deg") {
+            let reason = format!(
+                "{} degrees is wider than `outer_cone_deg` ({}); allowed: up to `outer_cone_deg`",
+                self.inner_cone_deg, self.outer_cone_deg
+            );
+            errors.push(BuildError { key: "inner_cone_deg".into(), kind: ProblemKind::Conflict(reason) });
+        }
+        errors
+    }
+
+    fn hide(&mut self) -> bool {
+        self.visible = false;
+        true
+    }
+
+    fn is_visible(&self) -> bool {
+        self.visible
+    }
+
+    fn light(&self, t: f64) -> Option<Light> {
+        Some(self.at(t))
+    }
+
+    fn light_parts(&self, shutter: Shutter) -> usize {
+        self.parts_of_exposure(shutter)
+    }
+}
+
+fn draw(tables: &[BuiltTable], _context: &BuildContext) -> Arc<dyn Phenomenon> {
+    let lights: Vec<LightParameters> = tables.iter().filter_map(BuiltTable::parameters).cloned().collect();
+    Arc::new(Lamps::new(move |t| {
+        lights.iter().map(|light| Lamp { light: light.at(t), radius: light.radius }).collect()
+    }))
 }

@@ -11,10 +11,9 @@ use bansho_base::{
         surroundings::Emitter,
     },
 };
-
 use fearless_simd::dispatch;
 
-use super::model::Lamp;
+use super::Lamp;
 
 /// Fraction of a spot's light that its housing scatters outside of the cone.
 pub(super) const STRAY_LIGHT: f64 = 0.02;

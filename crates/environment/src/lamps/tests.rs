@@ -13,7 +13,7 @@ use bansho_base::{
     world::wind::{Wind, WindParameters},
 };
 
-use super::{model::*, render::*};
+use super::{render::*, *};
 
 /// A picture of one lamp of 50 cd: its camera and its luminance, row by row.
 fn picture(camera: CameraParameters, size: [usize; 2], lamp: Lamp) -> (Camera, Vec<f32>) {

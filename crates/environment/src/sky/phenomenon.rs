@@ -1,4 +1,4 @@
-//! `impl Phenomenon`: how the renderer uses the sky.
+//! The table `[sky]`, and how the renderer uses the sky (`impl Phenomenon`).
 
 use std::sync::Arc;
 
@@ -11,9 +11,14 @@ use bansho_base::{
         strip::{DepthInterval, Shutter, View, parts_of_motion},
         surroundings::{Publication, Surroundings},
     },
+    tables::{BuildContext, BuiltTable, SceneSky, SharedRole, SharedTable, TableCount, TableKind},
+    world::sky::SkyKind,
 };
 
-use super::{model::SkyBackdrop, render::PreparedSky, row_cache::FAR};
+use super::{
+    SkyBackdrop, SkyParameters,
+    render::{FAR, PreparedSky},
+};
 
 impl Phenomenon for SkyBackdrop {
     fn info(&self) -> PhenomenonInfo<'_> {
@@ -75,4 +80,57 @@ impl Run for SkyBackdrop {
         let cache = self.night_sky(&sky, view, &cameras);
         Ok(Box::new(PreparedSky { view, cameras, sky, cache, skyline: self.skyline(), hills: self.hills() }))
     }
+}
+
+/// White balance of a camera at night, K.
+const NIGHT_WHITE_K: f64 = 4000.0;
+
+impl SkyParameters {
+    /// The table `[sky]`.
+    pub const KIND: TableKind = TableKind {
+        layer: Some(SkyBackdrop::NAME),
+        ..TableKind::shared::<Self>(
+            "sky",
+            TableCount::Optional,
+            SharedRole {
+                draw: Some(draw),
+                draw_order: 40,
+                is_behind_plates: true,
+                fingerprint_order: 20,
+                implied_unless: Some(&["light"]),
+                ..SharedRole::new::<Self>()
+            },
+        )
+    };
+}
+
+impl SharedTable for SkyParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
+
+    fn hide(&mut self) -> bool {
+        self.visible = false;
+        true
+    }
+
+    fn is_visible(&self) -> bool {
+        self.visible
+    }
+
+    fn fills_background(&self) -> bool {
+        self.visible
+    }
+
+    fn white_balance_k(&self) -> Option<f64> {
+        (self.kind == SkyKind::Night).then_some(NIGHT_WHITE_K)
+    }
+
+    fn sky(&self, t: f64) -> Option<SceneSky> {
+        Some(SceneSky { sky: self.at(t), is_visible: self.visible })
+    }
+}
+
+fn draw(tables: &[BuiltTable], context: &BuildContext) -> Arc<dyn Phenomenon> {
+    Arc::new(SkyBackdrop::new(BuiltTable::first_or_default(tables), context.seed))
 }

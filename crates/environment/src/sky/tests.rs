@@ -20,7 +20,7 @@ use bansho_base::{
     },
 };
 
-use super::{row_cache::FAR, *};
+use super::{render::FAR, *};
 
 /// Light of a night sky through a camera that turns by an angle in degrees during the exposure: green, row by row.
 fn night_seen(turn_deg: f64, hills_deg: f64) -> Vec<f32> {

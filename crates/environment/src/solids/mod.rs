@@ -13,7 +13,7 @@
 //!
 //! | equation | function |
 //! | --- | --- |
-//! | ray and triangle | `bvh::Triangle::intersect` |
+//! | ray and triangle | `intersect::Triangle::intersect` |
 //! | ray and sphere, box, cylinder | `intersect::sphere`, `intersect::cuboid`, `intersect::cylinder` |
 //! | diffuse reflection `albedo E cos / pi` | `shade::Shading::lights` |
 //! | GGX reflection `F D G / (4 cos cos)` | `shade::specular_brdf` |
@@ -26,20 +26,67 @@
 //! scene without them ([`OpaqueSurfaces`](bansho_base::phenomenon::OpaqueSurfaces)). Where other things move over the same pixels, the renderer draws them at
 //! many moments of the exposure (`trace::UntracedSolids`).
 
-mod bvh;
 mod intersect;
-mod model;
 mod obstacle;
-mod parameters;
 mod phenomenon;
 mod pose;
 mod shade;
-mod table;
 mod trace;
-
-pub use model::Solids;
-pub use obstacle::{Obstacle, ObstacleMesh};
-pub use parameters::{ObstacleParameters, ObstacleShape};
 
 #[cfg(test)]
 mod tests;
+
+use bansho_base::color::acescg_from_srgb;
+use intersect::TriangleBvh;
+pub use obstacle::{Obstacle, ObstacleMesh, ObstacleParameters, ObstacleShape};
+
+/// The visible obstacles of a scene.
+#[derive(Debug)]
+pub struct Solids {
+    solids: Vec<Solid>,
+}
+
+/// A visible obstacle.
+#[derive(Debug)]
+struct Solid {
+    obstacle: Obstacle,
+    /// Its triangles, if it is a mesh.
+    triangles: Option<TriangleBvh>,
+    material: Material,
+}
+
+/// How a surface reflects light.
+#[derive(Clone, Copy, Debug)]
+struct Material {
+    /// ACEScg.
+    albedo: [f32; 3],
+    /// GGX alpha.
+    roughness: f64,
+    /// Reflectance at normal incidence.
+    reflectance: f64,
+}
+
+impl Material {
+    fn new(parameters: &ObstacleParameters) -> Self {
+        Self {
+            albedo: acescg_from_srgb(parameters.color.map(|value| value as f32)),
+            roughness: parameters.roughness,
+            reflectance: parameters.reflectance,
+        }
+    }
+}
+
+impl Solids {
+    /// The name of their layer.
+    pub const NAME: &str = "obstacles";
+
+    /// Obstacles that are visible.
+    pub fn new(obstacles: Vec<Obstacle>) -> Self {
+        let mut solids = Vec::with_capacity(obstacles.len());
+        for obstacle in obstacles {
+            let triangles = obstacle.mesh().map(|mesh| TriangleBvh::new(&mesh.mesh));
+            solids.push(Solid { triangles, material: Material::new(obstacle.parameters()), obstacle });
+        }
+        Self { solids }
+    }
+}

@@ -1,18 +1,24 @@
-//! `impl Phenomenon`: how the renderer uses visible obstacles.
+//! The table `[[obstacle]]`, and how the renderer uses visible obstacles (`impl Phenomenon`).
 
-use std::sync::Arc;
+use std::{any::Any, sync::Arc};
 
 use bansho_base::{
-    host::observer::{Cancelled, Observer},
+    host::{
+        assets::Assets,
+        observer::{Cancelled, Observer},
+    },
+    parameters::BuildError,
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
         strip::{DepthInterval, Shutter, View},
         surroundings::{Publication, Surroundings},
     },
+    tables::{BuildContext, BuiltTable, SharedObject, SharedRole, SharedTable, TableCount, TableKind},
+    world::occluder::Occluder,
 };
 
 use super::{
-    model::Solids,
+    Obstacle, ObstacleParameters, ObstacleShape, Solids,
     pose::parts_of_exposure,
     trace::{PreparedSolids, UntracedSolids, depth_intervals},
 };
@@ -64,4 +70,51 @@ impl Run for Solids {
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         Ok(Box::new(UntracedSolids::new(self, view, surroundings)))
     }
+}
+
+impl ObstacleParameters {
+    /// The table `[[obstacle]]`.
+    pub const KIND: TableKind = TableKind {
+        layer: Some(Solids::NAME),
+        ..TableKind::shared::<Self>(
+            "obstacle",
+            TableCount::List,
+            SharedRole {
+                draw: Some(draw),
+                draw_order: 20,
+                fingerprint_order: 40,
+                determines_view: true,
+                ..SharedRole::new::<Self>()
+            },
+        )
+    };
+}
+
+impl SharedTable for ObstacleParameters {
+    fn kind(&self) -> TableKind {
+        Self::KIND
+    }
+
+    /// A plane is never drawn: that is what `[ground]` is for.
+    fn is_visible(&self) -> bool {
+        self.visible && self.shape != ObstacleShape::Plane
+    }
+
+    fn build(&self, assets: &dyn Assets) -> Result<Option<Arc<dyn SharedObject>>, BuildError> {
+        Ok(Some(Arc::new(Obstacle::new(self, assets)?)))
+    }
+}
+
+impl SharedObject for Obstacle {
+    fn solid(&self, t: f64) -> Option<Occluder> {
+        Some(self.at(t))
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}
+
+fn draw(tables: &[BuiltTable], _context: &BuildContext) -> Arc<dyn Phenomenon> {
+    Arc::new(Solids::new(tables.iter().filter_map(BuiltTable::object).cloned().collect()))
 }

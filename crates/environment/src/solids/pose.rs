@@ -8,9 +8,8 @@ use bansho_base::{
 };
 
 use super::{
-    ObstacleShape,
+    ObstacleShape, Solid, Solids,
     intersect::{self, Hit, Ray},
-    model::{Solid, Solids},
 };
 
 /// Most time samples of an exposure.

@@ -8,7 +8,7 @@ use bansho_base::{
 };
 
 use super::{
-    model::Material,
+    Material,
     pose::{Pose, SurfacePoint},
 };
 use crate::ground::height_of_level_ground;

@@ -15,7 +15,7 @@ use bansho_base::{
 };
 
 use super::{
-    model::Solids,
+    Solids,
     pose::{Pose, SurfacePoint, poses},
     shade::Shading,
 };

@@ -18,7 +18,7 @@ use crate::{
         drop_lighting::{DropLighting, ScatteringTable},
         drop_phase_function::DropPhaseFunction,
     },
-    render::prepared::PreparedRain,
+    render::PreparedRain,
 };
 
 const SIZE: [usize; 2] = [160, 90];

@@ -23,7 +23,7 @@ use bansho_base::{
     },
 };
 
-use super::{Method, Rain, RainParameters, RainRun, lighting::LightCaches, render::prepared::PreparedRain};
+use super::{Method, Rain, RainParameters, RainRun, lighting::LightCaches, render::PreparedRain};
 
 pub(super) const METHODS: [Method; 2] = [Method::Billboards, Method::Drops];
 

@@ -15,8 +15,7 @@ use bansho_base::{
     },
 };
 
-use super::texture_set::StreakTexture;
-use super::texture_set::TextureSet;
+use super::{StreakTexture, TextureSet};
 use crate::{aovs::write_aovs, drops::shutter_state::ShutterState};
 
 /// Edge of a voxel and of a billboard, m.

@@ -30,10 +30,7 @@
 //! # Ok::<(), StreakTextureError>(())
 //! ```
 
-mod draw;
-mod error;
-
-use std::f64::consts::PI;
+use std::{f64::consts::PI, fmt};
 
 use bansho_base::{
     image::Image,
@@ -42,8 +39,6 @@ use bansho_base::{
         random::{self, Key, Purpose},
     },
 };
-use draw::{draw_line, draw_streak};
-pub use error::{StreakQuantity, StreakTextureError};
 
 use crate::{
     drops::{
@@ -283,3 +278,208 @@ pub fn lit_radiance(toward: [f64; 3], phase_function: &DropPhaseFunction) -> Res
 
 #[cfg(test)]
 mod tests;
+
+/// A quantity that a streak texture is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum StreakQuantity {
+    /// Edge of the cube.
+    Edge,
+    /// Pixels on a side of the texture.
+    Size,
+    /// Duration of the exposure.
+    Exposure,
+    /// Mean number of drops of a bin in the cube, which grows with the rain rate and the cube.
+    MeanDropCount,
+    /// Diameter of a drop or of a bin.
+    DiameterMm,
+    /// Speed of a drop.
+    Speed,
+    /// Coordinate of a drop.
+    Position,
+    /// Amplitude of the oscillation of drops.
+    Oscillation,
+}
+
+impl StreakQuantity {
+    /// The smallest and the largest value that is allowed.
+    #[must_use]
+    pub const fn limits(self) -> [f64; 2] {
+        match self {
+            Self::Edge => [1e-3, 100.0],
+            Self::Size => [1.0, 4096.0],
+            Self::Exposure => [1e-6, 10.0],
+            Self::MeanDropCount => [0.0, 1e6],
+            Self::DiameterMm => [1e-6, 40.0],
+            Self::Speed => [0.0, 1000.0],
+            Self::Position => [-1000.0, 1000.0],
+            Self::Oscillation => [0.0, 1.0],
+        }
+    }
+
+    /// Its unit; empty for a number.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Edge | Self::Position => "m",
+            Self::Size => "pixels",
+            Self::Exposure => "s",
+            Self::DiameterMm => "mm",
+            Self::Speed => "m/s",
+            Self::MeanDropCount | Self::Oscillation => "",
+        }
+    }
+
+    /// Checks a value; NaN is out of range.
+    pub(super) fn check(self, value: f64) -> Result<(), StreakTextureError> {
+        let [min, max] = self.limits();
+        if (min..=max).contains(&value) {
+            return Ok(());
+        }
+        Err(StreakTextureError::OutOfRange { quantity: self, value })
+    }
+}
+
+impl fmt::Display for StreakQuantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Edge => "edge of the cube",
+            Self::Size => "size of the texture",
+            Self::Exposure => "exposure",
+            Self::MeanDropCount => "mean number of drops",
+            Self::DiameterMm => "diameter",
+            Self::Speed => "speed of a drop",
+            Self::Position => "position of a drop",
+            Self::Oscillation => "amplitude of the oscillation",
+        })
+    }
+}
+
+/// Why a streak texture cannot be drawn.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StreakTextureError {
+    /// A quantity is out of range, or not a number.
+    #[error("{quantity}: {value} {}; allowed: {} to {}", .quantity.unit(), .quantity.limits()[0], .quantity.limits()[1])]
+    OutOfRange {
+        /// The quantity.
+        quantity: StreakQuantity,
+        /// Its value.
+        value: f64,
+    },
+    /// The diameters of a bin do not ascend.
+    #[error("a bin of diameters from {} to {} mm; allowed: ascending limits", .range_mm[0], .range_mm[1])]
+    BinRange {
+        /// Its ends, mm.
+        range_mm: [f64; 2],
+    },
+    /// A texture that is drawn over has another size than the cube.
+    #[error("a texture of {width} x {height} pixels; allowed: {size} x {size}, as set for the cube")]
+    ImageSize {
+        /// Columns of the texture.
+        width: usize,
+        /// Rows of the texture.
+        height: usize,
+        /// Size of the cube's textures.
+        size: usize,
+    },
+    /// The vector toward the light has no direction.
+    #[error("the light direction is the zero vector; allowed: a vector with at least one nonzero component")]
+    LightDirection,
+}
+
+/// Quadrature lines within a row of pixels at a streak's ends, where its width varies.
+const SAMPLE_LINES: usize = 4;
+
+/// Draws a streak over an image, with wrap-around. The drop's center is at `start` when the shutter opens, m from the
+/// left and upper edges, and falls. A pixel is `pixel` wide and high, m. `weight` scales the opacity between two positions along the streak, m.
+pub(crate) fn draw_streak(
+    streak: &Streak,
+    [axis, start]: [f64; 2],
+    pixel: [f64; 2],
+    weight: &dyn Fn(f64, f64) -> f64,
+    image: &mut Image<1>,
+) {
+    let [width, height] = pixel;
+    let first_column = ((axis - streak.radius) / width).floor();
+    let columns = ((axis + streak.radius) / width).floor() - first_column + 1.0;
+    let across = PixelColumns { streak, left: first_column * width - axis, pixel, columns: columns as usize };
+    let mut opacities = vec![0.0; across.columns];
+    let within = across.line(0.5 * streak.length);
+    let first_row = ((start - streak.radius) / height).floor() as i64;
+    let last_row = ((start + streak.length + streak.radius) / height).floor() as i64;
+    for row in first_row..=last_row {
+        let from = row as f64 * height - start;
+        let whole = streak.is_within(from) && streak.is_within(from + height);
+        let opacities = if whole { &within } else { across.end_row(from, &mut opacities) };
+        let y = row.rem_euclid(image.height() as i64) as usize;
+        blend(image.row_mut(y), first_column as i64, weight(from, from + height), opacities);
+    }
+}
+
+/// Draws the paper's line over an image, with wrap-around: one pixel wide, alike in opacity from `start` downward over `length`, m.
+pub(crate) fn draw_line([x, start]: [f64; 2], length: f64, opacity: f64, pixel: f64, image: &mut Image<1>) {
+    let column = (x / pixel).floor() as i64;
+    let (first, last) = ((start / pixel).floor() as i64, ((start + length) / pixel).floor() as i64);
+    for row in first..=last {
+        let top = row as f64 * pixel;
+        let covered = ((top + pixel).min(start + length) - top.max(start)) / pixel;
+        let y = row.rem_euclid(image.height() as i64) as usize;
+        blend(image.row_mut(y), column, covered.clamp(0.0, 1.0), &[opacity]);
+    }
+}
+
+/// Composites opacities over a row, with wrap-around.
+fn blend(row: &mut [[f32; 1]], first_column: i64, weight: f64, opacities: &[f64]) {
+    let width = row.len();
+    let mut x = first_column.rem_euclid(width as i64) as usize;
+    for &opacity in opacities {
+        let [under] = &mut row[x];
+        *under += (weight * opacity) as f32 * (1.0 - *under);
+        x = if x + 1 == width { 0 } else { x + 1 };
+    }
+}
+
+/// The columns of pixels that a streak covers.
+struct PixelColumns<'a> {
+    streak: &'a Streak,
+    /// Left edge of the first pixel relative to the axis, m.
+    left: f64,
+    pixel: [f64; 2],
+    columns: usize,
+}
+
+impl PixelColumns<'_> {
+    /// Mean opacity of each pixel on the line at `s`.
+    fn line(&self, s: f64) -> Vec<f64> {
+        let mut opacities = vec![0.0; self.columns];
+        self.add_line(s, 1.0, &mut opacities);
+        opacities
+    }
+
+    fn add_line(&self, s: f64, weight: f64, opacities: &mut [f64]) {
+        let mut before = 0.0;
+        for (index, opacity) in opacities.iter_mut().enumerate() {
+            let until = self.streak.opacity_integral_to(self.left + (index + 1) as f64 * self.pixel[0], s);
+            *opacity += weight * (until - before) / self.pixel[0];
+            before = until;
+        }
+    }
+
+    /// Mean opacity of each pixel of a row that begins at `from` and contains an end of the streak. The distribution
+    /// comes from quadrature, the sum is exact.
+    fn end_row<'b>(&self, from: f64, opacities: &'b mut [f64]) -> &'b [f64] {
+        let (streak, [width, height]) = (self.streak, self.pixel);
+        let (top, bottom) = (from.max(-streak.radius), (from + height).min(streak.length + streak.radius));
+        opacities.fill(0.0);
+        let step = (bottom - top) / SAMPLE_LINES as f64;
+        (0..SAMPLE_LINES).for_each(|line| self.add_line(top + step * (line as f64 + 0.5), 1.0, opacities));
+        let area =
+            streak.blocked_area() * (streak.area_fraction_along(from + height) - streak.area_fraction_along(from));
+        let found: f64 = opacities.iter().sum();
+        let scale = if found > 0.0 { area / (found * width * height) } else { 0.0 };
+        // Near the rim of a resolved drop, rounding may exceed the range of an opacity.
+        opacities.iter_mut().for_each(|opacity| *opacity = (*opacity * scale).clamp(0.0, 1.0));
+        opacities
+    }
+}

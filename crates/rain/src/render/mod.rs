@@ -1,4 +1,0 @@
-//! Rendering of one frame.
-
-pub(crate) mod prepared;
-mod streak_parts;
