@@ -150,10 +150,9 @@ fn raindrop(shutter_state: &ShutterState, batch: &DropBatch, streaks: &VisibleSt
 
 /// Drops as points for export.
 pub(crate) fn point_cloud(drops: &[Raindrop], origin: [f64; 3]) -> PointCloud {
-    let quantity = |value: fn(&Raindrop) -> f64| drops.iter().map(|drop| value(drop) as f32).collect::<Vec<f32>>();
     let quantities = BTreeMap::from([
-        (Quantity::DiameterMm, quantity(|drop| drop.diameter_mm)),
-        (Quantity::Opacity, quantity(|drop| drop.opacity)),
+        (Quantity::DiameterMm, drops.iter().map(|drop| drop.diameter_mm as f32).collect()),
+        (Quantity::Opacity, drops.iter().map(|drop| drop.opacity as f32).collect()),
     ]);
     let velocities = drops.iter().map(|drop| drop.velocity.as_vec3().to_array()).collect();
     PointCloud::new(origin, drops.iter().map(|drop| drop.position.to_array()), velocities, quantities)

@@ -357,12 +357,13 @@ fn part_count(view: &View) -> usize {
     let Shutter { open, close } = view.shutter;
     let times = (0..=MAX_PARTS).map(|step| open + (close - open) * (step as f64 / MAX_PARTS as f64));
     let cameras: Vec<Camera> = times.map(|t| view.camera_at(t)).collect();
-    let sum = |difference: fn(&Camera, &Camera) -> f64| -> f64 {
-        cameras.windows(2).map(|pair| difference(&pair[0], &pair[1])).sum()
-    };
-    let (duration, travel) = (close - open, sum(|a, b| (a.position - b.position).length()));
-    let turn = sum(turn) / MAX_TURN;
-    let zoom = sum(|a, b| math::ln(a.focal_pixels / b.focal_pixels).abs()) / MAX_ZOOM;
+    let (mut travel, mut turn, mut zoom) = (0.0, 0.0, 0.0);
+    for pair in cameras.windows(2) {
+        travel += (pair[0].position - pair[1].position).length();
+        turn += turn_between(&pair[0], &pair[1]);
+        zoom += math::ln(pair[0].focal_pixels / pair[1].focal_pixels).abs();
+    }
+    let (duration, turn, zoom) = (close - open, turn / MAX_TURN, zoom / MAX_ZOOM);
     // Rounding must not cut an exposure of exactly the longest duration.
     if [duration / MAX_WHOLE_S - 1e-6, travel / MAX_WHOLE_TRAVEL, turn, zoom].into_iter().all(|ratio| ratio <= 1.0) {
         return 1;
@@ -372,7 +373,7 @@ fn part_count(view: &View) -> usize {
 }
 
 /// Angle between the orientations of two cameras, if it is small, radians.
-fn turn(a: &Camera, b: &Camera) -> f64 {
+fn turn_between(a: &Camera, b: &Camera) -> f64 {
     // The columns of a rotation by a small angle w about an axis n change by w n x column, whose squares sum to 2 w^2.
     let difference = a.world_from_camera - b.world_from_camera;
     math::sqrt(0.5 * (0..3).map(|column| difference.col(column).length_squared()).sum::<f64>())

@@ -213,11 +213,11 @@ impl ShutterCameras {
     /// has the center `point` and the half extents `half`.
     #[inline(always)]
     pub(crate) fn may_be_visible(&self, point: DVec3, half: DVec3, radius: f64) -> bool {
-        let mut seen = self.frusta.is_empty();
+        let mut is_visible = self.frusta.is_empty();
         for frustum in &self.frusta {
-            seen |= frustum.may_be_visible(point, half, radius);
+            is_visible |= frustum.may_be_visible(point, half, radius);
         }
-        seen
+        is_visible
     }
 
     /// A range of t outside of which no point `start + t step` passes [`may_be_visible`](Self::may_be_visible); empty if its ends are reversed.

@@ -30,13 +30,13 @@ pub(super) fn format(root: &Table, reader: &mut Reader) -> bool {
 
 /// Reports keys at the root that no kind has.
 pub(super) fn root_keys(root: &Table, kinds: &[TableKind], reader: &mut Reader) {
-    let known: Vec<&str> = std::iter::once("bansho").chain(kinds.iter().map(|kind| kind.key)).collect();
+    let root_keys: Vec<&str> = std::iter::once("bansho").chain(kinds.iter().map(|kind| kind.key)).collect();
     for entry in &root.entries {
-        if !known.contains(&entry.key.as_str()) {
+        if !root_keys.contains(&entry.key.as_str()) {
             reader.report_with(Some(entry.key_span.clone()), || ProblemKind::UnknownKey {
                 key: entry.key.clone(),
-                nearest: nearest(&entry.key, known.iter().copied()).map(str::to_owned),
-                allowed: known.iter().map(|&key| key.to_owned()).collect(),
+                nearest: nearest(&entry.key, root_keys.iter().copied()).map(str::to_owned),
+                allowed: root_keys.iter().map(|&key| key.to_owned()).collect(),
             });
         }
     }

@@ -327,8 +327,8 @@ impl PreparedAurora<'_> {
         }
         for i in inside.clone().filter(|i| sky[*i] > 0.0) {
             let direction = camera.direction(DVec2::new((x + i) as f64 + 0.5, y as f64 + 0.5));
-            let seen = light[i].map(|value| sky[i] * value);
-            self.measure_pixel(strip, first + i - inside.start, &seen, direction, camera_weight);
+            let radiance = light[i].map(|value| sky[i] * value);
+            self.measure_pixel(strip, first + i - inside.start, &radiance, direction, camera_weight);
         }
     }
 

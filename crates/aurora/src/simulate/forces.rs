@@ -286,11 +286,11 @@ impl Integrator {
     fn energy_limit_factor(&self, before: [f32; 2], after: [f32; 2], potential_drop: f32) -> f32 {
         let energy = (2.0 * self.lorentz_weight).fma(potential_drop, before[0].fma(before[0], before[1] * before[1]));
         let energy = if energy > 0.0 { energy } else { 0.0 };
-        let found = after[0].fma(after[0], after[1] * after[1]);
-        if !found.is_finite() {
+        let speed_squared = after[0].fma(after[0], after[1] * after[1]);
+        if !speed_squared.is_finite() {
             0.0
-        } else if self.limit_energy && found > energy {
-            (energy / found).sqrt()
+        } else if self.limit_energy && speed_squared > energy {
+            (energy / speed_squared).sqrt()
         } else {
             1.0
         }

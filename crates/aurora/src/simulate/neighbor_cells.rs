@@ -29,8 +29,8 @@ pub(super) struct NeighborCells {
 
 /// A sum over neighbors: values of the neighbor are `[x, z, a, b]`, sums are two numbers.
 trait CellTerm: Sync {
-    /// Adds the term of a neighbor at `offset` (from it to the particle) with its two values to the sums of a particle with its own value.
-    fn add(&self, offset: [f32; 2], distance_squared: f32, own: f32, other: [f32; 2], sums: [f32; 2]) -> [f32; 2];
+    /// Adds the term of a neighbor at `offset` (from it to the particle) with its two values to the sums of a particle with a `value`.
+    fn add(&self, offset: [f32; 2], distance_squared: f32, value: f32, other: [f32; 2], sums: [f32; 2]) -> [f32; 2];
 }
 
 /// `m_j W`, (2.11).
@@ -52,11 +52,11 @@ impl<K: SmoothingKernel<2>> CellTerm for Pressure<K> {
         &self,
         [x, z]: [f32; 2],
         distance_squared: f32,
-        own: f32,
-        [pressure, volume]: [f32; 2],
+        pressure: f32,
+        [other_pressure, volume]: [f32; 2],
         sums: [f32; 2],
     ) -> [f32; 2] {
-        let factor = (own + pressure) * volume * self.0.gradient_factor(distance_squared);
+        let factor = (pressure + other_pressure) * volume * self.0.gradient_factor(distance_squared);
         [x.fma(factor, sums[0]), z.fma(factor, sums[1])]
     }
 }
@@ -128,14 +128,14 @@ impl NeighborCells {
         pressures: &[f32],
         accelerations: &mut [Vec<f32>; 2],
     ) {
-        let (own, sorted_densities) = (self.in_cell_order(pressures), self.in_cell_order(densities));
+        let (sorted_pressures, sorted_densities) = (self.in_cell_order(pressures), self.in_cell_order(densities));
         let volumes: Vec<f32> =
             self.masses.iter().zip(&sorted_densities).map(|(mass, density)| mass / density).collect();
-        let values = [own.as_slice(), &volumes];
+        let values = [sorted_pressures.as_slice(), &volumes];
         let sums = match kernel {
-            KernelShape::Poly6 => self.sum(&Pressure(Poly6::new(self.support)), &own, values),
-            KernelShape::Spiky => self.sum(&Pressure(Spiky::new(self.support)), &own, values),
-            KernelShape::CubicSpline => self.sum(&Pressure(CubicSpline::new(self.support)), &own, values),
+            KernelShape::Poly6 => self.sum(&Pressure(Poly6::new(self.support)), &sorted_pressures, values),
+            KernelShape::Spiky => self.sum(&Pressure(Spiky::new(self.support)), &sorted_pressures, values),
+            KernelShape::CubicSpline => self.sum(&Pressure(CubicSpline::new(self.support)), &sorted_pressures, values),
         };
         for values in accelerations.iter_mut() {
             values.resize(self.order.len(), 0.0);
@@ -147,8 +147,8 @@ impl NeighborCells {
         }
     }
 
-    /// Sums of all particles, in sorted order; `own` and `others` are sorted too.
-    fn sum<T: CellTerm>(&self, term: &T, own: &[f32], others: [&[f32]; 2]) -> Vec<[f32; 2]> {
+    /// Sums of all particles, in sorted order; `values` and `others` are sorted too.
+    fn sum<T: CellTerm>(&self, term: &T, values: &[f32], others: [&[f32]; 2]) -> Vec<[f32; 2]> {
         let (columns, level) = (self.size[0], bansho_base::math::simd::level());
         let occupied = (0..self.starts.len() - 1).filter(|cell| self.starts[*cell] < self.starts[cell + 1]);
         let occupied: Vec<usize> = occupied.collect();
@@ -157,7 +157,7 @@ impl NeighborCells {
             .with_max_len(1)
             .flat_map_iter(|cell| {
                 let mut sums = [Vec::new(), Vec::new()];
-                dispatch!(level, _simd => self.sum_cell(term, cell, columns, own, others, &mut sums));
+                dispatch!(level, _simd => self.sum_cell(term, cell, columns, values, others, &mut sums));
                 let [first, second] = sums;
                 first.into_iter().zip(second).map(|(first, second)| [first, second])
             })
@@ -171,13 +171,13 @@ impl NeighborCells {
         term: &T,
         cell: usize,
         columns: usize,
-        own: &[f32],
+        values: &[f32],
         others: [&[f32]; 2],
         sums: &mut [Vec<f32>; 2],
     ) {
         let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
         let (xs, zs) = (&self.positions[0][range.clone()], &self.positions[1][range.clone()]);
-        let own = &own[range];
+        let values = &values[range];
         let (max, min) = (self.support * self.support, COINCIDENCE * self.support * self.support);
         let [first, second] = sums;
         first.resize(xs.len(), 0.0);
@@ -195,7 +195,7 @@ impl NeighborCells {
                     // factor of the gradient need not be finite at 0.
                     let squared = if squared < max { squared } else { max };
                     let squared = if squared > min { squared } else { min };
-                    [first[i], second[i]] = term.add(offset, squared, own[i], other, [first[i], second[i]]);
+                    [first[i], second[i]] = term.add(offset, squared, values[i], other, [first[i], second[i]]);
                 }
             }
         }

@@ -105,8 +105,8 @@ impl LightInFog {
         let factors = match &self.geometry {
             Geometry::Directional(toward) => directional(toward, segments, extinction),
             Geometry::Near { offset, min_square, cone } => {
-                let seen = SegmentsFromLight::new(offset, cone.as_ref(), segments);
-                seen.factors(*min_square, cone.as_ref(), extinction)
+                let segments_from_light = SegmentsFromLight::new(offset, cone.as_ref(), segments);
+                segments_from_light.factors(*min_square, cone.as_ref(), extinction)
             }
         };
         for c in 0..3 {
@@ -133,7 +133,7 @@ fn directional([x, y, z]: &[f32; 3], segments: &Segments, extinction: f32) -> La
 impl SegmentsFromLight {
     #[inline(always)]
     fn new([x, y, z]: &[f32; 3], cone: Option<&Cone>, segments: &Segments) -> Self {
-        let mut seen = Self {
+        let mut from_light = Self {
             height: [0.0; LANES],
             inverse_height: [0.0; LANES],
             first: [0.0; LANES],
@@ -159,16 +159,16 @@ impl SegmentsFromLight {
             let (sine, cosine) = (approximations::sin_turns(turns), approximations::cos_turns(turns));
             let inverse = 1.0 / height.fma(height, first * first).sqrt();
             let (first_cosine, first_sine) = (height * inverse, first * inverse);
-            (seen.height[i], seen.first[i], seen.half_angle[i]) = (height, first, half_angle);
-            seen.inverse_height[i] = 1.0 / height;
-            seen.middle[0][i] = first_cosine * cosine - first_sine * sine;
-            seen.middle[1][i] = first_sine * cosine + first_cosine * sine;
+            (from_light.height[i], from_light.first[i], from_light.half_angle[i]) = (height, first, half_angle);
+            from_light.inverse_height[i] = 1.0 / height;
+            from_light.middle[0][i] = first_cosine * cosine - first_sine * sine;
+            from_light.middle[1][i] = first_sine * cosine + first_cosine * sine;
             if let Some(Cone { axis, along, .. }) = cone {
-                seen.line_cosine[i] = axis[0].fma(xs[i], axis[1].fma(ys[i], axis[2] * zs[i]));
-                seen.nearest_along[i] = nearest.fma(seen.line_cosine[i], -along);
+                from_light.line_cosine[i] = axis[0].fma(xs[i], axis[1].fma(ys[i], axis[2] * zs[i]));
+                from_light.nearest_along[i] = nearest.fma(from_light.line_cosine[i], -along);
             }
         }
-        seen
+        from_light
     }
 
     /// Scattered radiance by luminous intensity, 1/m^2: with few nodes where a segment subtends a small angle. Each line of sight has the same

@@ -20,7 +20,7 @@ use super::{
     lake::WaveSlopes,
     lighting::array,
     parameters::GroundKind,
-    row_cache::{GroundLightBatch, KnownRows},
+    row_cache::{CachedRows, GroundLightBatch},
     sample::SampledImage,
     sampled,
     shade::{PreparedGround, pixel_centers, wet_albedo_factor},
@@ -118,23 +118,23 @@ impl PreparedGround<'_> {
     fn light_of<S: Simd>(&self, simd: S, hits: &Hits<S>, [x, y]: [usize; 2]) -> GroundLightBatch {
         let window = self.view.window;
         let (row, batch) = (y.wrapping_sub(window.y), x / LANES - window.x / LANES);
-        match &self.known_rows {
-            KnownRows::Light(rows) => {
-                if let Some(known) = rows[row].get() {
-                    return known[batch];
+        match &self.cached_rows {
+            CachedRows::Light(rows) => {
+                if let Some(batches) = rows[row].get() {
+                    return batches[batch];
                 }
                 let light = self.light_row(simd, y);
                 rows[row].get_or_init(|| light)[batch]
             }
-            KnownRows::Pattern(rows) => {
-                if let Some(known) = rows[row].get() {
-                    return self.light(simd, hits, &known[batch], [x, y]);
+            CachedRows::Pattern(rows) => {
+                if let Some(batches) = rows[row].get() {
+                    return self.light(simd, hits, &batches[batch], [x, y]);
                 }
                 let samples = self.sample_row(simd, y);
                 let samples = &rows[row].get_or_init(|| samples)[batch];
                 self.light(simd, hits, samples, [x, y])
             }
-            KnownRows::None => self.light(simd, hits, &self.samples(hits), [x, y]),
+            CachedRows::None => self.light(simd, hits, &self.samples(hits), [x, y]),
         }
     }
 

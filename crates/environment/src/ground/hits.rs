@@ -44,9 +44,9 @@ impl<S: Simd> Hits<S> {
             Lanes::from_slice(simd, &directions.components[1]),
             Lanes::from_slice(simd, &directions.components[2]),
         ];
-        let mut seen = [0.0; LANES];
+        let mut in_view = [0.0; LANES];
         for i in 0..LANES {
-            seen[i] = if directions.visible[i] { 1.0 } else { 0.0 };
+            in_view[i] = if directions.visible[i] { 1.0 } else { 0.0 };
         }
         let [dx, dy, dz] = direction;
         let per_length = Lanes::splat(simd, 1.0) / dx.fma(dx, dy.fma(dy, dz * dz)).simd_sqrt();
@@ -54,7 +54,7 @@ impl<S: Simd> Hits<S> {
         let viewer = [dx * toward, dy * toward, dz * toward];
         // A pixel subtends about 1 / focal radians.
         let below_horizon = viewer[1].fma(focal_lanes, Lanes::splat(simd, 0.5)).simd_clamp01();
-        let coverage = below_horizon * Lanes::from_slice(simd, &seen);
+        let coverage = below_horizon * Lanes::from_slice(simd, &in_view);
         let cos = viewer[1].simd_max(Lanes::splat(simd, 0.5 / focal));
         let height = Lanes::splat(simd, camera_height as f32);
         let distance = (height / cos).simd_min(Lanes::splat(simd, (HORIZON * 0.5) as f32));

@@ -186,10 +186,10 @@ impl Waves {
             for i in 0..LANES {
                 // Below two pixels a wave is not resolved, from six pixels on wholly.
                 let footprint = if footprint[i] > 1e-9 { footprint[i] } else { 1e-9 };
-                let seen = smoothstep(2.0, 6.0, wave.length / footprint);
-                visibility[i] = seen;
-                largest = if seen > largest { seen } else { largest };
-                slopes.unresolved[i] += (-seen).fma(seen, 1.0) * (1.0 / WAVE_COUNT as f32);
+                let resolved = smoothstep(2.0, 6.0, wave.length / footprint);
+                visibility[i] = resolved;
+                largest = if resolved > largest { resolved } else { largest };
+                slopes.unresolved[i] += (-resolved).fma(resolved, 1.0) * (1.0 / WAVE_COUNT as f32);
             }
             if largest <= 0.0 {
                 continue;

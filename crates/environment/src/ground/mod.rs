@@ -69,7 +69,7 @@ pub struct Ground {
     surface: Surface,
     key: Key,
     loop_s: Option<f64>,
-    known_rows: GroundRowCache,
+    row_cache: GroundRowCache,
 }
 
 impl Ground {
@@ -80,7 +80,7 @@ impl Ground {
     pub fn new(parameters: GroundParameters, seed: u64, loop_s: Option<f64>) -> Self {
         let key = Key::new(seed, Self::NAME);
         let surface = Surface::new(&parameters, key);
-        Self { surface, parameters, key, loop_s, known_rows: GroundRowCache::default() }
+        Self { surface, parameters, key, loop_s, row_cache: GroundRowCache::default() }
     }
 
     /// The lake in a frame; `None` for other kinds of ground.

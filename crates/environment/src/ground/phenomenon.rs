@@ -104,7 +104,7 @@ impl Run for Ground {
             has_film,
             lake,
             backdrop,
-            known_rows: self.known_rows.rows(view, has_film, light),
+            cached_rows: self.row_cache.rows(view, has_film, light),
         }))
     }
 }

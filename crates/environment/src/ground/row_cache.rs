@@ -67,15 +67,15 @@ fn is_same_occluder(a: &Occluder, b: &Occluder) -> bool {
 
 /// A view in recent frames.
 #[derive(Debug)]
-struct KnownView {
+struct CachedView {
     view: ViewInputs,
     light: LightInputs,
-    rows: KnownRows,
+    rows: CachedRows,
 }
 
 /// The rows that are kept of a view.
 #[derive(Clone, Debug)]
-pub(super) enum KnownRows {
+pub(super) enum CachedRows {
     /// None: in the first frame with this camera, which may be moving.
     None,
     /// The pattern, while lights change.
@@ -86,37 +86,37 @@ pub(super) enum KnownRows {
 
 /// Recent views of a ground.
 #[derive(Debug, Default)]
-pub(super) struct GroundRowCache(Mutex<Vec<KnownView>>);
+pub(super) struct GroundRowCache(Mutex<Vec<CachedView>>);
 
 impl GroundRowCache {
     /// Views kept: a window, and the whole picture that is drawn instead where air refracts light.
     const CAPACITY: usize = 2;
 
     /// The rows of a view, at first empty.
-    pub(super) fn rows(&self, view: &View, has_film: bool, light: LightInputs) -> KnownRows {
+    pub(super) fn rows(&self, view: &View, has_film: bool, light: LightInputs) -> CachedRows {
         let inputs = ViewInputs { camera: view.camera, size: view.size, window: view.window, has_film };
         if view.window.width * view.window.height > MAX_CACHED_PIXELS {
-            return KnownRows::None;
+            return CachedRows::None;
         }
         // The list is always consistent, so a poisoned lock is usable.
         let mut recent = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(index) = recent.iter().position(|known| known.view == inputs) else {
-            recent.insert(0, KnownView { view: inputs, light, rows: KnownRows::None });
+        let Some(index) = recent.iter().position(|cached_view| cached_view.view == inputs) else {
+            recent.insert(0, CachedView { view: inputs, light, rows: CachedRows::None });
             recent.truncate(Self::CAPACITY);
-            return KnownRows::None;
+            return CachedRows::None;
         };
         recent[..=index].rotate_right(1);
-        let known = &mut recent[0];
-        let is_lit_alike = known.light == light;
-        known.light = light;
+        let cached_view = &mut recent[0];
+        let is_lit_alike = cached_view.light == light;
+        cached_view.light = light;
         let height = view.window.height;
-        match &known.rows {
-            KnownRows::Light(_) if is_lit_alike => {}
-            KnownRows::Pattern(_) if !is_lit_alike => {}
-            _ if is_lit_alike => known.rows = KnownRows::Light(empty_rows(height)),
-            _ => known.rows = KnownRows::Pattern(empty_rows(height)),
+        match &cached_view.rows {
+            CachedRows::Light(_) if is_lit_alike => {}
+            CachedRows::Pattern(_) if !is_lit_alike => {}
+            _ if is_lit_alike => cached_view.rows = CachedRows::Light(empty_rows(height)),
+            _ => cached_view.rows = CachedRows::Pattern(empty_rows(height)),
         }
-        known.rows.clone()
+        cached_view.rows.clone()
     }
 }
 

@@ -22,7 +22,7 @@ use super::{
     hits::{Hits, RowDepths},
     lighting::{GroundLight, Shadows, array},
     parameters::{GroundKind, GroundParameters},
-    row_cache::{GroundLightBatch, KnownRows},
+    row_cache::{CachedRows, GroundLightBatch},
     sample::SampledImage,
     surface::{GroundPositions, Surface, SurfaceSamples},
     wet_reflection::{FilmDirection, Microfacets, fresnel},
@@ -74,7 +74,7 @@ pub(super) struct PreparedGround<'a> {
     pub(super) lake: Option<LakeFrame<'a>>,
     /// The plate and its sky, blurred as a rough film of water reflects them.
     pub(super) backdrop: Option<Backdrop>,
-    pub(super) known_rows: KnownRows,
+    pub(super) cached_rows: CachedRows,
 }
 
 /// What sixteen pixels see of a film of water.

@@ -100,7 +100,7 @@ impl<'a> Shading<'a> {
         // The ground that a surface sees is about as far away as the surface is high.
         let ground = self.ground_radiance(point + DVec3::new(normal.x, 0.0, normal.z) * 1.5, sky);
         let mirrored = 2.0 * normal.dot(viewer) * normal - viewer;
-        let seen = if mirrored.y >= 0.0 {
+        let mirrored_radiance = if mirrored.y >= 0.0 {
             self.surroundings.sky.radiance(mirrored).map(f64::from)
         } else {
             let down = self.ground.map_or(1.0, |height| (point.y - height).max(0.0)) / -mirrored.y.min(-0.02);
@@ -110,7 +110,7 @@ impl<'a> Shading<'a> {
         let glossy = fresnel(material.reflectance, normal.dot(viewer)) * (1.0 - 0.7 * material.roughness);
         [0, 1, 2].map(|c| {
             let diffuse = f64::from(material.albedo[c]) * (up * sky[c] / PI + (1.0 - up) * ground[c]);
-            diffuse + glossy * seen[c]
+            diffuse + glossy * mirrored_radiance[c]
         })
     }
 

@@ -251,8 +251,8 @@ impl Tracer<'_> {
             .any(|[x, y]| is_in_any(self.rects, x, y));
             *corner = None;
             if is_near {
-                let seen = self.middle().seen(DVec2::new(x as f64, y as f64));
-                *corner = seen.map(|surface| (surface.index, surface.normal));
+                let surface = self.middle().seen(DVec2::new(x as f64, y as f64));
+                *corner = surface.map(|surface| (surface.index, surface.normal));
             }
         }
     }

@@ -36,12 +36,11 @@ impl AtomicFile {
     /// # Errors
     /// The folder cannot be created or written, the disk is full, `path` is a folder, a device or a pipe, or it leads to a file that must not be replaced.
     pub fn create(path: &Path, policy: &OverwritePolicy) -> Result<Self, MediaError> {
-        let fail = |source| MediaError::from_io(path, source);
         // First, because a path such as `missing/../a.png` can only be resolved when its folders exist.
         fs::create_dir_all(folder_of(path)).map_err(|source| match source.kind() {
             // The error of `create_dir_all` if a parent folder is a file.
             io::ErrorKind::AlreadyExists => MediaError::NotAFolder { path: path.to_path_buf() },
-            _ => fail(source),
+            _ => MediaError::from_io(path, source),
         })?;
         match fs::metadata(path) {
             Ok(existing) if existing.is_dir() => return Err(MediaError::IsFolder { path: path.to_path_buf() }),
@@ -54,11 +53,14 @@ impl AtomicFile {
         let target = match fs::canonicalize(path) {
             Ok(target) if path.is_symlink() => target,
             // A dangling link is replaced; a link to itself is an error.
-            Err(source) if path.is_symlink() && source.kind() != io::ErrorKind::NotFound => return Err(fail(source)),
+            Err(source) if path.is_symlink() && source.kind() != io::ErrorKind::NotFound => {
+                return Err(MediaError::from_io(path, source));
+            }
             _ => path.to_path_buf(),
         };
         check_policy(policy, &target, path)?;
-        let (temporary, guard) = create_registered(|| temporary_in(folder_of(&target), &target)).map_err(fail)?;
+        let (temporary, guard) = create_registered(|| temporary_in(folder_of(&target), &target))
+            .map_err(|source| MediaError::from_io(path, source))?;
         Ok(Self { temporary, _guard: guard, path: path.to_path_buf(), target, policy: policy.clone() })
     }
 

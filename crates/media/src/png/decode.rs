@@ -157,16 +157,25 @@ fn append_rows(pixels: &mut Vec<[f32; 4]>, bytes: &[u8], color_type: ColorType, 
 
 fn append_values(pixels: &mut Vec<[f32; 4]>, mut values: impl Iterator<Item = f32>, color_type: ColorType) {
     // Values beyond the last whole pixel are dropped.
-    let mut next = || values.next();
     match color_type {
-        ColorType::Grayscale => pixels.extend(std::iter::from_fn(|| next().map(|y| [y, y, y, 1.0]))),
+        ColorType::Grayscale => pixels.extend(values.map(|y| [y, y, y, 1.0])),
         ColorType::GrayscaleAlpha => {
-            pixels.extend(std::iter::from_fn(|| next().zip(next()).map(|(y, a)| [y, y, y, a])));
+            while let (Some(y), Some(a)) = (values.next(), values.next()) {
+                pixels.push([y, y, y, a]);
+            }
         }
-        ColorType::Rgba => pixels.extend(std::iter::from_fn(|| Some([next()?, next()?, next()?, next()?]))),
+        ColorType::Rgba => {
+            while let (Some(r), Some(g), Some(b), Some(a)) =
+                (values.next(), values.next(), values.next(), values.next())
+            {
+                pixels.push([r, g, b, a]);
+            }
+        }
         // Palettes have been expanded.
         ColorType::Rgb | ColorType::Indexed => {
-            pixels.extend(std::iter::from_fn(|| Some([next()?, next()?, next()?, 1.0])));
+            while let (Some(r), Some(g), Some(b)) = (values.next(), values.next(), values.next()) {
+                pixels.push([r, g, b, 1.0]);
+            }
         }
     }
 }

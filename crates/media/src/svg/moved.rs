@@ -181,35 +181,34 @@ fn pair(point: DVec2) -> String {
 
 /// The text of a segment without `offset`, if it is absolute.
 fn moved(segment: &PathSegment, offset: DVec2, is_first: bool) -> String {
-    // `None` for a relative segment, whose numbers do not change.
-    let shift = |abs: bool| (abs || is_first).then_some(offset);
     match *segment {
-        PathSegment::MoveTo { abs, x, y } => command('M', "", &[[x, y]], shift(abs)),
-        PathSegment::LineTo { abs, x, y } => command('L', "", &[[x, y]], shift(abs)),
+        PathSegment::MoveTo { abs, x, y } => command('M', "", &[[x, y]], abs || is_first, offset),
+        PathSegment::LineTo { abs, x, y } => command('L', "", &[[x, y]], abs || is_first, offset),
         PathSegment::HorizontalLineTo { abs: true, x } => format!("H{}", x - offset.x),
         PathSegment::HorizontalLineTo { abs: false, x } => format!("h{x}"),
         PathSegment::VerticalLineTo { abs: true, y } => format!("V{}", y - offset.y),
         PathSegment::VerticalLineTo { abs: false, y } => format!("v{y}"),
         PathSegment::CurveTo { abs, x1, y1, x2, y2, x, y } => {
-            command('C', "", &[[x1, y1], [x2, y2], [x, y]], shift(abs))
+            command('C', "", &[[x1, y1], [x2, y2], [x, y]], abs || is_first, offset)
         }
-        PathSegment::SmoothCurveTo { abs, x2, y2, x, y } => command('S', "", &[[x2, y2], [x, y]], shift(abs)),
-        PathSegment::Quadratic { abs, x1, y1, x, y } => command('Q', "", &[[x1, y1], [x, y]], shift(abs)),
-        PathSegment::SmoothQuadratic { abs, x, y } => command('T', "", &[[x, y]], shift(abs)),
+        PathSegment::SmoothCurveTo { abs, x2, y2, x, y } => {
+            command('S', "", &[[x2, y2], [x, y]], abs || is_first, offset)
+        }
+        PathSegment::Quadratic { abs, x1, y1, x, y } => command('Q', "", &[[x1, y1], [x, y]], abs || is_first, offset),
+        PathSegment::SmoothQuadratic { abs, x, y } => command('T', "", &[[x, y]], abs || is_first, offset),
         PathSegment::EllipticalArc { abs, rx, ry, x_axis_rotation, large_arc, sweep, x, y } => {
             let [large, sweep] = [large_arc, sweep].map(u8::from);
             let ellipse = format!("{rx} {ry} {x_axis_rotation} {large} {sweep} ");
-            command('A', &ellipse, &[[x, y]], shift(abs))
+            command('A', &ellipse, &[[x, y]], abs || is_first, offset)
         }
         PathSegment::ClosePath { .. } => "Z".to_owned(),
     }
 }
 
-/// The text of a command: its `letter`, in lower case if it is relative, the numbers that are no coordinates, and points, from which the shift of an absolute
-/// command is subtracted.
-fn command(letter: char, numbers: &str, points: &[[f64; 2]], shift: Option<DVec2>) -> String {
-    let letter = if shift.is_some() { letter } else { letter.to_ascii_lowercase() };
-    let shift = shift.unwrap_or(DVec2::ZERO);
-    let points: Vec<String> = points.iter().map(|point| pair(DVec2::from(*point) - shift)).collect();
+/// The text of a command: its `letter`, in lower case if it is relative, the numbers that are no coordinates, and points. From those of an absolute command
+/// `offset` is subtracted; the numbers of a relative one do not change.
+fn command(letter: char, numbers: &str, points: &[[f64; 2]], is_absolute: bool, offset: DVec2) -> String {
+    let (letter, offset) = if is_absolute { (letter, offset) } else { (letter.to_ascii_lowercase(), DVec2::ZERO) };
+    let points: Vec<String> = points.iter().map(|point| pair(DVec2::from(*point) - offset)).collect();
     format!("{letter}{numbers}{}", points.join(" "))
 }

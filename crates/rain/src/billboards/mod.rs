@@ -52,20 +52,21 @@ type DropTexture = Vec<[LaneArray; 2]>;
 struct DropTextures(Vec<[DropTexture; VARIANTS]>);
 
 impl DropTextures {
-    /// Drops are keyed by their index, so that a texture with more drops contains those with fewer.
     fn new(key: Key, classes: &[DropClassState]) -> Self {
-        let texture = |class: &DropClassState, variant: usize| -> DropTexture {
-            let drops = class.count().ceil() as u64;
-            let mut texture = vec![[ZERO_LANES; 2]; (drops as usize).div_ceil(LANES)];
-            for index in 0..drops {
-                let [x, y, ..] = key.uniforms((variant as u64) << 32 | index, 0, class.purpose(TEXTURE));
-                let (batch, i) = (&mut texture[index as usize / LANES], index as usize % LANES);
-                (batch[0][i], batch[1][i]) = (x, y);
-            }
-            texture
-        };
-        Self(classes.iter().map(|class| std::array::from_fn(|variant| texture(class, variant))).collect())
+        Self(classes.iter().map(|class| std::array::from_fn(|variant| drop_texture(key, class, variant))).collect())
     }
+}
+
+/// The positions of the drops of a class in one of its textures. Drops are keyed by their index, so that a texture with more drops contains those with fewer.
+fn drop_texture(key: Key, class: &DropClassState, variant: usize) -> DropTexture {
+    let drops = class.count().ceil() as u64;
+    let mut texture = vec![[ZERO_LANES; 2]; (drops as usize).div_ceil(LANES)];
+    for index in 0..drops {
+        let [x, y, ..] = key.uniforms((variant as u64) << 32 | index, 0, class.purpose(TEXTURE));
+        let (batch, i) = (&mut texture[index as usize / LANES], index as usize % LANES);
+        (batch[0][i], batch[1][i]) = (x, y);
+    }
+    texture
 }
 
 /// A billboard: a quad, and a window into a texture.

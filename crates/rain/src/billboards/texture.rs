@@ -258,8 +258,13 @@ impl StreakCube {
             let phases = key.uniforms(x.to_bits(), (y + z).to_bits() as u32, PHASE);
             let oscillation = Oscillation::new(drop.diameter_mm, amplitude, [phases[0], phases[1]]);
             let speed = drop.speed.max(MIN_SPEED);
-            let brightness = |from: f64, to: f64| oscillation.mean_brightness(from / speed, to / speed);
-            draw_streak(&self.streak(drop), [x, self.edge - y], [self.pixel(); 2], &brightness, image);
+            draw_streak(
+                &self.streak(drop),
+                [x, self.edge - y],
+                [self.pixel(); 2],
+                &|from, to| oscillation.mean_brightness(from / speed, to / speed),
+                image,
+            );
         }
         Ok(())
     }
@@ -275,9 +280,6 @@ pub fn lit_radiance(toward: [f64; 3], phase_function: &DropPhaseFunction) -> Res
     // The light travels along `-toward`, and is scattered to the viewer along z.
     Ok(phase_function.phase(-toward.z as f32).map(|phase| phase / (4.0 * PI) as f32))
 }
-
-#[cfg(test)]
-mod tests;
 
 /// A quantity that a streak texture is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -476,10 +478,13 @@ impl PixelColumns<'_> {
         (0..SAMPLE_LINES).for_each(|line| self.add_line(top + step * (line as f64 + 0.5), 1.0, opacities));
         let area =
             streak.blocked_area() * (streak.area_fraction_along(from + height) - streak.area_fraction_along(from));
-        let found: f64 = opacities.iter().sum();
-        let scale = if found > 0.0 { area / (found * width * height) } else { 0.0 };
+        let sum: f64 = opacities.iter().sum();
+        let scale = if sum > 0.0 { area / (sum * width * height) } else { 0.0 };
         // Near the rim of a resolved drop, rounding may exceed the range of an opacity.
         opacities.iter_mut().for_each(|opacity| *opacity = (*opacity * scale).clamp(0.0, 1.0));
         opacities
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -291,36 +291,15 @@ impl ShutterState {
     }
 
     /// Cells of a class with drops that may be visible within a sphere. Drops are drawn up to `half_width` (m) from the cell's center in x and z.
-    pub(crate) fn visible_cells(
-        &self,
-        class: &DropClassState,
-        Sphere { center, radius }: Sphere,
-        half_width: f64,
-    ) -> Vec<VisibleCell> {
-        let eye = self.cameras.middle().position;
+    pub(crate) fn visible_cells(&self, class: &DropClassState, bounds: Sphere, half_width: f64) -> Vec<VisibleCell> {
         let extents = class.lattice.half_extents(half_width);
         // The drops that gusts carry into the sphere, and the centers of their cells.
-        let sphere = [center - radius, center + radius];
+        let sphere = [bounds.center - bounds.radius, bounds.center + bounds.radius];
         let [low, high] = self.gusts.as_ref().map_or(sphere, |gusts| gusts.source_bounds(sphere));
         let [low, high] = [low - extents, high + extents];
         let travel =
             0.5 * (class.speed + self.cameras.velocity().length()) * self.cameras.exposure_time + MAX_DROP_RADIUS;
         let mut cells = Vec::new();
-        let mut add = |cell, line: &DropLine| {
-            let DropState { position: point, velocity, bends } = self.drop_of_line(class, cell, line);
-            // Drops are displaced by other gusts than the center of their cell.
-            let margin = self.gusts.as_ref().map_or(DVec3::ZERO, |gusts| {
-                let undisplaced = class.lattice.point_in_world(cell, DVec3::splat(0.5));
-                gusts.difference_around(undisplaced, extents.max_element())
-            });
-            let half = extents + margin;
-            let nearest = ((point - center).abs() - half).max(DVec3::ZERO).length();
-            let bend = bends.map_or(0.0, |[open, close]| open.length().max(close.length()));
-            let wind_travel = 0.5 * horizontal(velocity).length() * self.cameras.exposure_time + bend;
-            if nearest < radius && self.cameras.may_be_visible(point, half, travel + wind_travel) {
-                cells.push(VisibleCell { center: point, distance: (point - eye).length(), cell });
-            }
-        };
         let lines = self.cell_lines(class, extents, travel);
         let rows = [low.y.max(self.ground - CELL_SIZE), high.y].map(|y| class.lattice.row(y));
         for row in rows[0]..=rows[1] {
@@ -329,11 +308,46 @@ impl ShutterState {
                 let [from, to] = lines.visible_part(class, [x, row], [first[1], last[1]]);
                 if from <= to {
                     let line = self.drop_line(class, [x, row], [from, to]);
-                    (from..=to).for_each(|z| add(LatticeCell([x, row, z]), &line));
+                    for z in from..=to {
+                        cells.extend(self.visible_cell(
+                            class,
+                            LatticeCell([x, row, z]),
+                            &line,
+                            bounds,
+                            extents,
+                            travel,
+                        ));
+                    }
                 }
             }
         }
         cells
+    }
+
+    /// A cell of a line, if its drops may be visible within a sphere. They are drawn within `extents` of its center (m), and move up to `travel` (m) relative
+    /// to the camera beside what the wind adds.
+    fn visible_cell(
+        &self,
+        class: &DropClassState,
+        cell: LatticeCell,
+        line: &DropLine,
+        Sphere { center, radius }: Sphere,
+        extents: DVec3,
+        travel: f64,
+    ) -> Option<VisibleCell> {
+        let DropState { position: point, velocity, bends } = self.drop_of_line(class, cell, line);
+        // Drops are displaced by other gusts than the center of their cell.
+        let margin = self.gusts.as_ref().map_or(DVec3::ZERO, |gusts| {
+            let undisplaced = class.lattice.point_in_world(cell, DVec3::splat(0.5));
+            gusts.difference_around(undisplaced, extents.max_element())
+        });
+        let half = extents + margin;
+        let nearest = ((point - center).abs() - half).max(DVec3::ZERO).length();
+        let bend = bends.map_or(0.0, |[open, close]| open.length().max(close.length()));
+        let wind_travel = 0.5 * horizontal(velocity).length() * self.cameras.exposure_time + bend;
+        let is_visible = nearest < radius && self.cameras.may_be_visible(point, half, travel + wind_travel);
+        let distance = (point - self.cameras.middle().position).length();
+        is_visible.then_some(VisibleCell { center: point, distance, cell })
     }
 
     /// Lines of cells of a class whose drops move up to `travel` (m) relative to the camera beside what the wind adds.

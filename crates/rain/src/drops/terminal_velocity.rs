@@ -201,8 +201,8 @@ pub fn fixed_point_velocity(diameter_mm: f64, air: &FallAir) -> Result<f64, NoTe
         speed = next;
         if converged {
             let reynolds = reynolds_number(speed, diameter_mm, air);
-            let known = reynolds < 1e4;
-            return if known { Ok(speed) } else { Err(NoTerminalVelocity::TooFast { diameter_mm, reynolds }) };
+            let is_in_range = reynolds < 1e4;
+            return if is_in_range { Ok(speed) } else { Err(NoTerminalVelocity::TooFast { diameter_mm, reynolds }) };
         }
     }
     Err(NoTerminalVelocity::DragJump { diameter_mm })

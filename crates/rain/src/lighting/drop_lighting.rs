@@ -119,19 +119,25 @@ impl DropLighting<'_> {
     /// considers the angle by which the light turns, and is far below [`max_radiance`](Self::max_radiance), since drops are brightest straight before a
     /// light.
     pub(crate) fn max_radiance_along(&self, center: DVec3, radius: f64, direction: DVec3) -> f32 {
-        let radiance = |light: &Light| {
-            let incident = light.incident_light(center);
-            let cosine = incident.toward.dot(direction).clamp(-1.0, 1.0);
-            let sine = math::sqrt(1.0 - cosine * cosine);
-            // The light that comes nearest to straight on: turned by the angle under which the light sees the sphere.
-            let turn = (radius / incident.distance.max(radius)).min(1.0);
-            let turn = if incident.distance > 0.0 { [math::sqrt(1.0 - turn * turn), turn] } else { [1.0, 0.0] };
-            let nearest = if sine <= turn[1] && cosine > 0.0 { 1.0 } else { cosine * turn[0] + sine * turn[1] };
+        let radiances = self.lights.iter().map(|light| {
+            let nearest = nearest_to_straight_on(light, center, radius, direction);
             let scattered = self.scattering.at(nearest as f32).into_iter().fold(0.0, f32::max);
             max_illuminance(light, center, radius) * scattered
-        };
-        self.lights.iter().map(radiance).sum()
+        });
+        radiances.sum()
     }
+}
+
+/// Cosine of the smallest angle between `direction` and light that travels to a point within `radius` (m) of `center`: that at the center, turned by the angle
+/// under which the light sees the sphere.
+fn nearest_to_straight_on(light: &Light, center: DVec3, radius: f64, direction: DVec3) -> f64 {
+    let incident = light.incident_light(center);
+    let cosine = incident.toward.dot(direction).clamp(-1.0, 1.0);
+    let sine = math::sqrt(1.0 - cosine * cosine);
+    // The sphere of a light within it is seen under a right angle; a directional light, whose distance is 0, sees every sphere as a point.
+    let turn = (radius / incident.distance.max(radius)).min(1.0);
+    let turn = if incident.distance > 0.0 { [math::sqrt(1.0 - turn * turn), turn] } else { [1.0, 0.0] };
+    if sine <= turn[1] && cosine > 0.0 { 1.0 } else { cosine * turn[0] + sine * turn[1] }
 }
 
 /// Upper bound on the illuminance by a light within `radius` (m) of a point, in any color, lux.

@@ -58,8 +58,8 @@ impl DropPhaseFunction {
     pub fn mean_radiance(&self, line: DVec3, radiance: impl Fn(DVec3) -> [f32; 3]) -> [f32; 3] {
         let (side, up) = line.any_orthonormal_pair();
         let sum = self.directions.iter().fold([0.0; 3], |sum: [f32; 3], direction| {
-            let seen = radiance(side * direction.x + up * direction.y + line * direction.z);
-            [0, 1, 2].map(|c| sum[c] + seen[c])
+            let incident = radiance(side * direction.x + up * direction.y + line * direction.z);
+            [0, 1, 2].map(|c| sum[c] + incident[c])
         });
         sum.map(|sum| sum * (1.0 / DIRECTIONS as f32))
     }

@@ -12,6 +12,7 @@ use super::{
     equiangular::MIN_LAMP_DISTANCE,
     in_scattering::{HALO_RADIUS, LampHalo},
     ray_segments::{MediumBounds, OpticalDepthTable, RaySegments, any_range},
+    tiles::TileGrid,
 };
 use crate::lanes::{LaneArray, ZERO_LANES, smoothstep};
 
@@ -89,13 +90,10 @@ impl HaloCorrector<'_> {
                 continue;
             }
             let column = x as f32 + i as f32 + 0.5;
-            let light = |tiles: &super::tiles::TileGrid, sums: &[[f32; 4]], distances: usize| {
-                let position = tiles.column_at(column);
-                let left = position.index * distances;
-                segments.in_scattered(i, sums, [left, left + distances], position.fraction)
-            };
-            let fine = light(&self.halo.fine_tiles, &rows.fine, self.halo.fine_in_scattering.distances);
-            let coarse = light(&self.halo.tiles, &rows.coarse, self.halo.in_scattering.distances);
+            let (fine_distances, distances) =
+                (self.halo.fine_in_scattering.distances, self.halo.in_scattering.distances);
+            let fine = light_at_column(&segments, i, &self.halo.fine_tiles, &rows.fine, fine_distances, column);
+            let coarse = light_at_column(&segments, i, &self.halo.tiles, &rows.coarse, distances, column);
             for c in 0..3 {
                 corrections[i][c] = fades[i] * (fine[c] * inverse_distances[i] - coarse[c]);
             }
@@ -130,4 +128,20 @@ impl HaloCorrector<'_> {
         }
         inverse
     }
+}
+
+/// Light that is scattered within the segment of lane `i`, between the columns of corners of a grid on both sides of a `column` of the picture (pixels);
+/// `sums` is a row of corners with so many distances each.
+#[inline(always)]
+fn light_at_column(
+    segments: &RaySegments,
+    i: usize,
+    tiles: &TileGrid,
+    sums: &[[f32; 4]],
+    distances: usize,
+    column: f32,
+) -> [f32; 4] {
+    let position = tiles.column_at(column);
+    let left = position.index * distances;
+    segments.in_scattered(i, sums, [left, left + distances], position.fraction)
 }

@@ -3,7 +3,7 @@
 
 use std::{
     ops::Range,
-    sync::{Arc, Mutex, OnceLock, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 
 use bansho_base::{
@@ -52,23 +52,16 @@ impl InScattering {
             return Self::new(integrator, tiles, lights);
         }
         let lamps: Vec<DVec2> = lights.iter().flat_map(|light| lamp_images(light, camera, SMOOTH_RADIUS)).collect();
+        let mut scattering =
+            Self::at_corners(integrator, tiles, lights, |corner| needs_integration(tiles, &lamps, corner));
         let [columns, rows] = tiles.size;
-        // The last column and row are integrated even if their index is odd: there is none beyond them to interpolate from.
-        let is_integrated = |corner: usize| {
-            let [column, row] = [corner % columns, corner / columns];
-            let is_second = [(column, columns), (row, rows)].map(|(index, count)| index % 2 == 1 && index + 1 < count);
-            let position = DVec2::from(tiles.pixel(corner).map(|coordinate| coordinate as f64));
-            is_second == [false; 2]
-                || lamps.iter().any(|lamp| lamp.distance_squared(position) < SMOOTH_RADIUS * SMOOTH_RADIUS)
-        };
-        let mut scattering = Self::at_corners(integrator, tiles, lights, is_integrated);
+        // Even rows first: an odd row is interpolated from those above and below it, of which every second corner is interpolated itself.
         for row in (0..rows).step_by(2).chain((1..rows).step_by(2)) {
             for column in 0..columns {
                 let corner = row * columns + column;
-                if is_integrated(corner) {
+                if needs_integration(tiles, &lamps, corner) {
                     continue;
                 }
-                // Rows between others are interpolated from those, which come before them.
                 let step = if row % 2 == 1 && row + 1 < rows { columns } else { 1 };
                 scattering.interpolate_corner(corner, step);
             }
@@ -129,6 +122,16 @@ impl InScattering {
             }
         }
     }
+}
+
+/// Whether the light at a corner of the picture's grid is integrated, with `lamps` at these pixels; otherwise it is interpolated between its neighbors.
+fn needs_integration(tiles: &TileGrid, lamps: &[DVec2], corner: usize) -> bool {
+    let [columns, rows] = tiles.size;
+    let [column, row] = [corner % columns, corner / columns];
+    // The last column and row are integrated even if their index is odd: there is none beyond them to interpolate from.
+    let is_second = [(column, columns), (row, rows)].map(|(index, count)| index % 2 == 1 && index + 1 < count);
+    let position = DVec2::from(tiles.pixel(corner).map(|coordinate| coordinate as f64));
+    is_second == [false; 2] || lamps.iter().any(|lamp| lamp.distance_squared(position) < SMOOTH_RADIUS * SMOOTH_RADIUS)
 }
 
 /// A lamp in the picture. The light scattered around it falls as 1/h with the distance h of the ray from the lamp, and
@@ -220,7 +223,7 @@ impl LampScatteringCache {
     /// Number of results that are kept.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).len()
+        self.lock().len()
     }
 
     /// The scattered light at the corners of `tiles`, as the integrator computes it.
@@ -231,17 +234,20 @@ impl LampScatteringCache {
         view: &View,
     ) -> Arc<LampScattering> {
         let inputs = integrator.inputs(view);
-        // The list is always consistent, so a poisoned lock is usable.
-        let cached = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = cached().iter().find(|known| known.inputs == inputs) {
-            return known.clone();
+        if let Some(scattering) = self.lock().iter().find(|scattering| scattering.inputs == inputs) {
+            return scattering.clone();
         }
         // Computed without the lock, so that no thread waits.
         let scattering = Arc::new(integrator.scattering(inputs, tiles, view));
-        let mut cached = cached();
-        cached.insert(0, scattering.clone());
-        cached.truncate(Self::CAPACITY);
+        let mut recent = self.lock();
+        recent.insert(0, scattering.clone());
+        recent.truncate(Self::CAPACITY);
         scattering
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Arc<LampScattering>>> {
+        // The list is always consistent, so a poisoned lock is usable.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -275,12 +281,15 @@ impl InScatterIntegrator<'_> {
 
     /// The intervals between the distances that lamps light.
     fn intervals(&self) -> Vec<Interval> {
-        let lit = self.distances.windows(2).zip(self.depths.windows(2)).filter(|(pair, _)| pair[0] < self.end);
-        let interval = |(pair, depths): (&[f64], &[f32])| {
-            let width = (pair[1] - pair[0]) as f32;
-            Interval { start: pair[0], width, depth: depths[0], depth_slope: (depths[1] - depths[0]) / width }
-        };
-        lit.map(interval).collect()
+        let mut intervals = Vec::with_capacity(self.distances.len());
+        for (pair, depths) in self.distances.windows(2).zip(self.depths.windows(2)) {
+            if pair[0] < self.end {
+                let width = (pair[1] - pair[0]) as f32;
+                let depth_slope = (depths[1] - depths[0]) / width;
+                intervals.push(Interval { start: pair[0], width, depth: depths[0], depth_slope });
+            }
+        }
+        intervals
     }
 
     fn scattering(&self, inputs: ScatteringInputs, tiles: &TileGrid, view: &View) -> LampScattering {
@@ -324,9 +333,13 @@ fn lamp_images(light: &Light, camera: &Camera, margin: f64) -> Vec<DVec2> {
     let Some(projection) = light.emitter.position().and_then(|position| camera.project(position)) else {
         return Vec::new();
     };
-    let is_near = |pixel: &DVec2| (0..2).all(|axis| (-margin..camera.size[axis] + margin).contains(&pixel[axis]));
     let images = camera.line_images(projection.pixel, projection.pixel, margin);
-    images.into_iter().map(|[pixel, _]| pixel).filter(is_near).collect()
+    images.into_iter().map(|[pixel, _]| pixel).filter(|pixel| is_near_picture(camera, *pixel, margin)).collect()
+}
+
+/// Whether a position is within the picture or at most `margin` pixels outside of it.
+fn is_near_picture(camera: &Camera, pixel: DVec2, margin: f64) -> bool {
+    (0..2).all(|axis| (-margin..camera.size[axis] + margin).contains(&pixel[axis]))
 }
 
 /// The halo of a lamp; `None` for a light at infinity, and where no pixel is near it.

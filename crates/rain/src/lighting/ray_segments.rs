@@ -56,26 +56,26 @@ impl OpticalDepthTable {
             high = distances[i].simd_max(high);
         }
         let [first, last] = [low, high].map(|distance| self.interval(distance));
-        let mut found = TablePositions { index: [first as u32; LANES], fraction: ZERO_LANES, depth: ZERO_LANES };
+        let mut positions = TablePositions { index: [first as u32; LANES], fraction: ZERO_LANES, depth: ZERO_LANES };
         // Neighboring pixels are mostly in the same interval.
         for start in &self.distances[first + 1..=last] {
             for i in 0..LANES {
-                found.index[i] += u32::from(distances[i] >= *start);
+                positions.index[i] += u32::from(distances[i] >= *start);
             }
         }
         let mut columns = [ZERO_LANES; 4];
         for i in 0..LANES {
-            let interval = self.intervals[found.index[i] as usize];
+            let interval = self.intervals[positions.index[i] as usize];
             for c in 0..4 {
                 columns[c][i] = interval[c];
             }
         }
         let [start, inverse_width, depth, increase] = &columns;
         for i in 0..LANES {
-            found.fraction[i] = ((distances[i] - start[i]) * inverse_width[i]).simd_clamp01();
-            found.depth[i] = increase[i].fma(found.fraction[i], depth[i]);
+            positions.fraction[i] = ((distances[i] - start[i]) * inverse_width[i]).simd_clamp01();
+            positions.depth[i] = increase[i].fma(positions.fraction[i], depth[i]);
         }
-        found
+        positions
     }
 
     /// Restricts positions to the distances at which the light of lamps is stored.

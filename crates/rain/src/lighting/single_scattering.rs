@@ -165,15 +165,19 @@ impl<'a> SingleScattering<'a> {
             }
             let bounds = self.bounds(has_plate);
             let corrector = HaloCorrector { halo, bounds, table: &self.table, lit_end: self.end, slice };
-            let mut compute = |y: usize, columns: Range<usize>, plate: &[f32]| dispatch!(self.level, _simd => corrector.row(y, columns, plate, &mut scratch));
             for y in rect.y..rect.bottom() {
                 let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
                 if has_plate {
                     let plate: Vec<f32> = (0..rect.width).map(|x| strip.plate_depth(first + x)).collect();
-                    add_corrections(strip, first, &compute(y, rect.x..rect.right(), &plate));
+                    let columns = rect.x..rect.right();
+                    let row = dispatch!(self.level, _simd => corrector.row(y, columns, &plate, &mut scratch));
+                    add_corrections(strip, first, &row);
                 } else {
                     let all = halo.rect.x..halo.rect.right();
-                    let row = get_or_compute(&halo.corrections[y - halo.rect.y], || compute(y, all, &[]));
+                    let row = get_or_compute(
+                        &halo.corrections[y - halo.rect.y],
+                        || dispatch!(self.level, _simd => corrector.row(y, all, &[], &mut scratch)),
+                    );
                     add_corrections(strip, first, &row[rect.x - halo.rect.x..rect.right() - halo.rect.x]);
                 }
             }
@@ -199,17 +203,13 @@ impl<'a> SingleScattering<'a> {
         let edges = [tile.start, tile.end].map(|y| self.corners(y, columns.clone(), slice));
         for y in rows.y..rows.bottom() {
             let down = ((y - tile.start) as f32 + 0.5) / tile.len() as f32;
-            let corner = |column: usize, c: usize| {
-                let (top, bottom) = (edges[0][column][c], edges[1][column][c]);
-                (bottom - top).fma(down, top)
-            };
             let start = (y - strip.rect.y) * strip.rect.width;
             for column in 0..edges[0].len() - 1 {
                 let left = (columns.start + column) * side;
                 let visible = left.max(rows.x)..(left + side).min(rows.right());
                 let mut values = [[0.0_f32; FINE_TILE]; 4];
                 for (c, values) in values.iter_mut().enumerate() {
-                    let (from, to) = (corner(column, c), corner(column + 1, c));
+                    let (from, to) = (between(&edges, column, c, down), between(&edges, column + 1, c, down));
                     for (x, value) in values.iter_mut().enumerate() {
                         *value = (to - from).fma((x as f32 + 0.5) * (1.0 / FINE_TILE as f32), from);
                     }
@@ -352,6 +352,13 @@ impl<'a> SingleScattering<'a> {
 #[inline(always)]
 fn across(i: usize) -> f32 {
     (i as f32 + 0.5) * (1.0 / FINE_TILE as f32)
+}
+
+/// A component at a column of corners, between two rows of corners: `down` of the way from the upper to the lower one.
+#[inline(always)]
+fn between(rows: &[Vec<[f32; 4]>; 2], column: usize, c: usize, down: f32) -> f32 {
+    let (top, bottom) = (rows[0][column][c], rows[1][column][c]);
+    (bottom - top).fma(down, top)
 }
 
 /// Adds a part of sixteen pixels under the contents of a strip, the first at its pixel `first`.

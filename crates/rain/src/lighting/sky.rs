@@ -1,6 +1,6 @@
 //! Sky light on drops, for the directions of a camera.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bansho_base::{camera::Camera, math::DVec3, phenomenon::strip::View, world::sky::Sky};
 
@@ -44,6 +44,11 @@ impl SkyLighting {
         let endless = endless_rain(&fine.tiles, &sky);
         Self { camera: view.camera, size: view.size, sky, coarse, fine, endless }
     }
+
+    /// Whether it is that of a view and a sky.
+    fn is_for(&self, view: &View, sky: &Sky) -> bool {
+        self.camera == view.camera && self.size == view.size && self.sky == *sky
+    }
 }
 
 /// Cache of recent sky light, keyed by camera, picture size and sky.
@@ -56,17 +61,20 @@ const CACHE_CAPACITY: usize = 2;
 impl SkyLightingCache {
     /// The sky light for the camera of a view.
     pub(crate) fn for_view(&self, phase_function: &DropPhaseFunction, view: &View, sky: Sky) -> Arc<SkyLighting> {
-        // The list is always consistent, so a poisoned lock is usable.
-        let cached = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = |seen: &&Arc<SkyLighting>| (seen.camera, seen.size, seen.sky) == (view.camera, view.size, sky);
-        if let Some(seen) = cached().iter().find(same) {
-            return seen.clone();
+        if let Some(lighting) = self.lock().iter().find(|lighting| lighting.is_for(view, &sky)) {
+            return lighting.clone();
         }
-        let seen = Arc::new(SkyLighting::new(phase_function, view, sky));
-        let mut cached = cached();
-        cached.insert(0, seen.clone());
-        cached.truncate(CACHE_CAPACITY);
-        seen
+        // Computed without the lock, so that no thread waits.
+        let lighting = Arc::new(SkyLighting::new(phase_function, view, sky));
+        let mut recent = self.lock();
+        recent.insert(0, lighting.clone());
+        recent.truncate(CACHE_CAPACITY);
+        lighting
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Arc<SkyLighting>>> {
+        // The list is always consistent, so a poisoned lock is usable.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

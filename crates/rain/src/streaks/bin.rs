@@ -54,8 +54,9 @@ fn touched_tiles([low, high]: [f32; 2], length: usize, tile_size: usize) -> [u16
         return [0, 0];
     }
     let (last, scale) = (((length - 1) / tile_size) as f32, 1.0 / tile_size as f32);
-    let tile_index = |tile: f32| (tile * scale).clamp(0.0, last) as i32 as u16;
-    [tile_index(low), tile_index(high) + 1]
+    // Clamped before the cast, since bounds may be infinite; to `i32` first, to which every instruction set converts directly.
+    let [first, last] = [(low * scale).clamp(0.0, last), (high * scale).clamp(0.0, last)];
+    [first as i32 as u16, last as i32 as u16 + 1]
 }
 
 impl TileBins {

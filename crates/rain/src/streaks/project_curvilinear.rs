@@ -75,13 +75,9 @@ impl DropPaths {
         let mut pieces = PathPieces { streaks: StreakBatch::NONE, positions: [ZERO_LANES; 3], count };
         let gain = self.gain[i] / count as f32;
         let [from, to] = [&self.from, &self.to].map(|points| cameras.point_in_world(points, i));
-        let seen = |step: usize| {
-            let camera = cameras.during_exposure(step * PATH_STEPS / count);
-            camera.project(from.lerp(to, step as f64 / count as f64))
-        };
-        let mut begin = seen(0);
+        let mut begin = project_at_step(cameras, [from, to], 0, count);
         for piece in 0..count {
-            let end = seen(piece + 1);
+            let end = project_at_step(cameras, [from, to], piece + 1, count);
             let middle = from.lerp(to, (piece as f64 + 0.5) / count as f64) - cameras.middle().position;
             (0..3).for_each(|axis| pieces.positions[axis][piece] = middle[axis] as f32);
             if let (Some(begin), Some(end)) = (begin, end) {
@@ -96,6 +92,11 @@ impl DropPaths {
         }
         pieces
     }
+}
+
+/// Where a drop on the path between two points, m, is seen after one of `count` steps of the exposure, by the camera of that moment.
+fn project_at_step(cameras: &ShutterCameras, [from, to]: [DVec3; 2], step: usize, count: usize) -> Option<Projection> {
+    cameras.during_exposure(step * PATH_STEPS / count).project(from.lerp(to, step as f64 / count as f64))
 }
 
 /// The power of two, at most the number of steps of an exposure, that is at least `ratio`.
@@ -116,12 +117,11 @@ fn segment(camera: &Camera, [from, to]: [Projection; 2], diameter_mm: f32, gain:
     let center = 0.5 * (from.pixel + to.pixel);
     let stretch = Stretch::at(camera, center, radius);
     let blocked_area = std::f64::consts::PI * drop_radius * drop_radius * stretch.ratio * f64::from(gain);
-    let single = |vector: DVec2| vector.as_vec2().to_array();
     StreakSegment::stretched(
         // On a fixed grid, so that a picture that is shifted by whole pixels, as by a turned panorama, has the same bits.
-        single((center * CENTER_STEPS).round() / CENTER_STEPS),
-        single(to.pixel - from.pixel),
-        single(stretch.widening(radius)),
+        ((center * CENTER_STEPS).round() / CENTER_STEPS).as_vec2().to_array(),
+        (to.pixel - from.pixel).as_vec2().to_array(),
+        stretch.widening(radius).as_vec2().to_array(),
         radius as f32,
         blocked_area as f32,
         depth as f32,

@@ -217,10 +217,10 @@ impl PlateParameters {
             remarks.push(PlateRemark::DepthFit(fit));
         }
         if let Some(height) = view.ground_height.filter(|_| self.fits_ground()) {
-            let found = ground_fit::fit(depth.values(), depth.size, size(image), view, height);
-            let found = found.map_err(|error| conflict("depth_kind", error))?;
-            depth.scale = found.scale();
-            remarks.push(PlateRemark::GroundFit(found));
+            let fit = ground_fit::fit(depth.values(), depth.size, size(image), view, height);
+            let fit = fit.map_err(|error| conflict("depth_kind", error))?;
+            depth.scale = fit.scale();
+            remarks.push(PlateRemark::GroundFit(fit));
         }
         let values = DepthValues::of(depth.values());
         if self.depth_kind != DepthKind::Inverse && values.are_negative() {

@@ -135,11 +135,11 @@ fn sample_row<S: Simd>(
     let mut x = 0;
     while x < width {
         let batch = PixelBatch::new(camera, field, x, y);
-        let mut found = [[0.0; 4]; PIXEL_BATCH];
+        let mut batch_light = [[0.0; 4]; PIXEL_BATCH];
         for sampler in samplers {
-            sampler.add(simd, &batch.longitude, &batch.colatitude, &mut found);
+            sampler.add(simd, &batch.longitude, &batch.colatitude, &mut batch_light);
         }
-        light.extend_from_slice(&found[..PIXEL_BATCH.min(width - x)]);
+        light.extend_from_slice(&batch_light[..PIXEL_BATCH.min(width - x)]);
         x += PIXEL_BATCH;
     }
 }

@@ -366,7 +366,7 @@ impl CollisionPass<'_> {
     ) {
         let last = (self.chart.rows - 1) as f32;
         // The kernel's support includes the spread by deflections, which the collisions have already.
-        let own_reach = reach.fma(reach, -track.spread_squared).max(0.0).sqrt();
+        let kernel_reach = reach.fma(reach, -track.spread_squared).max(0.0).sqrt();
         let mut row_range = RowRange::new(simd);
         let mut deviations = track.first;
         for batches in track.batches.chunks(PIPELINED_BATCHES) {
@@ -374,7 +374,7 @@ impl CollisionPass<'_> {
                 let deviation = Lanes::from_slice(simd, &self.collisions.deviations[deviations % DEVIATIONS]);
                 deviations += 1;
                 let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, distance_offset);
-                let offsets = deviation.fma(Lanes::splat(simd, own_reach), offsets);
+                let offsets = deviation.fma(Lanes::splat(simd, kernel_reach), offsets);
                 points.project(line.points(batch, offsets), last, rasterizer.odd_pairs(), &mut row_range);
             }
             for (batch, points) in batches.iter().zip(&*points) {

@@ -313,10 +313,10 @@ impl Chains {
 
     /// The chains, each starting with its lowest-numbered strand in forward direction.
     fn collect(&self) -> Vec<Vec<ChainLink>> {
-        let mut seen = vec![false; self.links.len()];
+        let mut in_chain = vec![false; self.links.len()];
         let mut chains = Vec::new();
         for strand in 0..self.links.len() {
-            if seen[strand] {
+            if in_chain[strand] {
                 continue;
             }
             let mut chain = vec![ChainLink { strand, reversed: false }];
@@ -333,7 +333,7 @@ impl Chains {
                     next = self.links[entered.line][1 - entered.end];
                 }
             }
-            chain.iter().for_each(|link| seen[link.strand] = true);
+            chain.iter().for_each(|link| in_chain[link.strand] = true);
             chains.push(chain);
         }
         chains

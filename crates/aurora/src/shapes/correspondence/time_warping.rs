@@ -57,9 +57,9 @@ pub(super) fn warp(points: &[DVec2], target: &Polyline, range: [f64; 2], evennes
             let from = &costs[first - step..=high - step];
             let (step_cost, number) = (step_costs[step], step as f64);
             for ((cost, best), from) in next[first..=high].iter_mut().zip(&mut best[first..=high]).zip(from) {
-                let found = from + step_cost;
-                *best = if found < *cost { number } else { *best };
-                *cost = if found < *cost { found } else { *cost };
+                let cost_by_way_of = from + step_cost;
+                *best = if cost_by_way_of < *cost { number } else { *best };
+                *cost = if cost_by_way_of < *cost { cost_by_way_of } else { *cost };
             }
         }
         let row = &mut steps[point * (slots + 1)..][..=slots];
@@ -88,9 +88,9 @@ fn warp_thinned(points: &[DVec2], target: &Polyline, range: [f64; 2], evenness: 
     }
     let chosen: Vec<usize> = (0..MAX_POINTS).map(|index| index * last / (MAX_POINTS - 1)).collect();
     let thinned: Vec<DVec2> = chosen.iter().map(|&point| points[point]).collect();
-    let found = warp(&thinned, target, range, evenness);
-    let mut all = vec![found[0]];
-    for (ends, end_fractions) in chosen.windows(2).zip(found.windows(2)) {
+    let thinned_fractions = warp(&thinned, target, range, evenness);
+    let mut all = vec![thinned_fractions[0]];
+    for (ends, end_fractions) in chosen.windows(2).zip(thinned_fractions.windows(2)) {
         let between = length_fractions(&points[ends[0]..=ends[1]]);
         all.extend(between[1..].iter().map(|&fraction| lerp(end_fractions[0], end_fractions[1], fraction)));
     }

@@ -29,12 +29,12 @@ enum Meeting {
 ///
 /// A cell list makes the cost linear for typical strokes; the search ends at the first crossing.
 pub fn first_crossing<S: AsRef<[DVec2]>>(sheets: &[S]) -> Option<[SegmentId; 2]> {
-    let mut found = None;
+    let mut crossing = None;
     for_each_meeting(sheets, Meeting::Touching, |pair| {
-        found = Some(pair);
+        crossing = Some(pair);
         false
     });
-    found
+    crossing
 }
 
 /// Number of properly crossing pairs of segments. In-between shapes may have some; this is not an error.
@@ -57,12 +57,12 @@ impl Shape {
 
 /// Indices of sheets with proper crossings.
 pub(crate) fn crossing_sheets<S: AsRef<[DVec2]>>(sheets: &[S]) -> BTreeSet<usize> {
-    let mut found = BTreeSet::new();
+    let mut crossed_sheets = BTreeSet::new();
     for_each_meeting(sheets, Meeting::Proper, |pair| {
-        found.extend(pair.map(|segment| segment.sheet));
+        crossed_sheets.extend(pair.map(|segment| segment.sheet));
         true
     });
-    found
+    crossed_sheets
 }
 
 /// All segments with non-zero length, in order.

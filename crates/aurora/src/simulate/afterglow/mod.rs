@@ -150,13 +150,13 @@ impl<const ALTITUDES: usize> Tile<ALTITUDES> {
     /// Applies the decay of one step. Returns the gain of the particles' power, and whether the tile is dark: no cell has as
     /// much power as `dark_w` would add.
     fn fade(&mut self, decay: &DecayFactors<ALTITUDES>, dark_w: f32) -> ([f32; ALTITUDES], bool) {
-        let kept = decay.of(self.energy_ev());
+        let decay_factors = decay.of(self.energy_ev());
         for values in self.powers.iter_mut().chain(&mut self.weighted) {
-            for (value, kept) in values.iter_mut().zip(kept) {
-                *value *= kept;
+            for (value, factor) in values.iter_mut().zip(decay_factors) {
+                *value *= factor;
             }
         }
-        let gain = kept.map(|kept| 1.0 - kept);
+        let gain = decay_factors.map(|factor| 1.0 - factor);
         let is_dark =
             self.powers.iter().all(|powers| powers.iter().zip(gain).all(|(power, gain)| *power < dark_w * gain));
         (gain, is_dark)

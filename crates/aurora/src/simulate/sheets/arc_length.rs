@@ -157,23 +157,23 @@ impl<'a> PreviousArcMap<'a> {
     /// Coordinates and directions of a sheet with these control points; a sheet without predecessor starts at the coordinate
     /// `start`, km.
     fn transfer_sheet(&self, tracks: &[usize], points: &[DVec2], start: f64) -> (Vec<f64>, Vec<bool>) {
-        let known: Vec<Option<[usize; 2]>> = tracks.iter().map(|&track| self.slot(track)).collect();
-        let (reversed, cumulative_lengths) = (self.reversed(&known, points), cumulative_lengths(points));
+        let slots: Vec<Option<[usize; 2]>> = tracks.iter().map(|&track| self.slot(track)).collect();
+        let (reversed, cumulative_lengths) = (self.reversed(&slots, points), cumulative_lengths(points));
         let mut coordinates: Vec<f64> = Vec::with_capacity(points.len());
         let (mut before, mut after) = (None, 0);
-        for (index, slot) in known.iter().enumerate() {
+        for (index, slot) in slots.iter().enumerate() {
             let found = match slot {
                 Some([sheet, slot]) => {
                     before = Some(index);
                     Some(self.map.coordinates[*sheet][*slot])
                 }
                 None => {
-                    while after < known.len() && (after < index || known[after].is_none()) {
+                    while after < slots.len() && (after < index || slots[after].is_none()) {
                         after += 1;
                     }
-                    let between = before.filter(|_| after < known.len()).map(|before| [before, after]);
+                    let between = before.filter(|_| after < slots.len()).map(|before| [before, after]);
                     let within = between
-                        .and_then(|ends| self.between_known(ends, &known, &reversed, &cumulative_lengths, index));
+                        .and_then(|ends| self.between_known(ends, &slots, &reversed, &cumulative_lengths, index));
                     within.or_else(|| Some(self.nearest(points[index])?.0.coordinate))
                 }
             };
@@ -193,14 +193,14 @@ impl<'a> PreviousArcMap<'a> {
     /// Direction of a sheet at its control points: reversed where it passes those of a previous sheet in the opposite
     /// order. New points take the direction of their neighbors, and a sheet of new points that of the nearest previous
     /// sheet.
-    fn reversed(&self, known: &[Option<[usize; 2]>], points: &[DVec2]) -> Vec<bool> {
+    fn reversed(&self, slots: &[Option<[usize; 2]>], points: &[DVec2]) -> Vec<bool> {
         // First and last slot by previous sheet, in the new order.
         let mut ends: BTreeMap<usize, [usize; 2]> = BTreeMap::new();
-        for [sheet, slot] in known.iter().flatten() {
+        for [sheet, slot] in slots.iter().flatten() {
             ends.entry(*sheet).or_insert([*slot; 2])[1] = *slot;
         }
-        let mut all: Vec<Option<bool>> = Vec::with_capacity(known.len());
-        for slot in known {
+        let mut all: Vec<Option<bool>> = Vec::with_capacity(slots.len());
+        for slot in slots {
             let reversed = slot.map(|[sheet, slot]| {
                 let is_opposite = ends.get(&sheet).is_some_and(|[first, last]| first > last);
                 self.map.reversed[sheet][slot] != is_opposite
@@ -230,12 +230,12 @@ impl<'a> PreviousArcMap<'a> {
     fn between_known(
         &self,
         ends: [usize; 2],
-        known: &[Option<[usize; 2]>],
+        slots: &[Option<[usize; 2]>],
         reversed: &[bool],
         cumulative_lengths: &[f64],
         index: usize,
     ) -> Option<f64> {
-        let [[sheet, first], [other, second]] = [known[ends[0]]?, known[ends[1]]?];
+        let [[sheet, first], [other, second]] = [slots[ends[0]]?, slots[ends[1]]?];
         let [from, to] = [self.map.coordinates[sheet][first], self.map.coordinates[other][second]];
         let length = cumulative_lengths[ends[1]] - cumulative_lengths[ends[0]];
         let is_one = sheet == other && reversed[ends[0]] == reversed[ends[1]] && joined(to - from, length);

@@ -78,8 +78,7 @@ impl StreakSegment {
             let [from, to] = [within[1].simd_min(within[0]) - 1.0, within[1].simd_max(within[0]) + 1.0];
             if self.slope.abs() < MIN_SLOPE { [-reach, reach] } else { [from.simd_max(-reach), to.simd_min(reach)] }
         };
-        let column_index = |x: f32| (x - left).simd_max(0.0).simd_min(TILE_COLUMNS as f32) as i32 as usize;
-        column_index(low)..column_index(high + 1.0)
+        clamp_column(low - left)..clamp_column(high + 1.0 - left)
     }
 
     #[inline(always)]
@@ -110,6 +109,12 @@ impl StreakSegment {
         let (from, to) = (from.simd_max(-self.half_length), to.simd_min(self.half_length));
         (self.line_coverage * (to - from).simd_max(0.0), self.slope * 0.5 * (from + to))
     }
+}
+
+/// The column of a tile at a distance from its left edge, pixels; at most one past the last.
+#[inline(always)]
+fn clamp_column(x: f32) -> usize {
+    x.simd_max(0.0).simd_min(TILE_COLUMNS as f32) as i32 as usize
 }
 
 /// A thin streak that is steeper than 45 degrees.

@@ -14,27 +14,27 @@ const MAX_SUGGESTIONS: usize = 3;
 /// scene has, else the parameter with the most similar name.
 pub(super) fn suggest_paths(text: &str, segments: &[&str], kinds: &[TableKind]) -> Vec<String> {
     let Ok(root) = toml::parse(text) else { return Vec::new() };
-    let known = known_paths(&root, kinds);
+    let paths = known_paths(&root, kinds);
     let (first, rest) = (segments[0], &segments[1..]);
     if let Some(table) = nearest(first, tables_of_scene(&root, kinds).map(|kind| kind.key)).filter(|_| !rest.is_empty())
     {
         return vec![format!("{table}.{}", rest.join("."))];
     }
     let last = segments[segments.len() - 1];
-    let mut suggestions = paths_ending_with(&known, segments);
+    let mut suggestions = paths_ending_with(&paths, segments);
     if suggestions.is_empty() {
-        suggestions = paths_ending_with(&known, &[last]);
+        suggestions = paths_ending_with(&paths, &[last]);
     }
     if suggestions.is_empty() {
-        let names = known.iter().filter_map(|path| path.last().copied());
-        suggestions = nearest(last, names).map_or_else(Vec::new, |name| paths_ending_with(&known, &[name]));
+        let names = paths.iter().filter_map(|path| path.last().copied());
+        suggestions = nearest(last, names).map_or_else(Vec::new, |name| paths_ending_with(&paths, &[name]));
     }
     suggestions
 }
 
 /// Up to [`MAX_SUGGESTIONS`] of the paths that end with `segments`. The parameter of a table is preferred to that of a table within it.
-fn paths_ending_with(known: &[Vec<&str>], segments: &[&str]) -> Vec<String> {
-    let matches: Vec<&Vec<&str>> = known.iter().filter(|path| path.ends_with(segments)).collect();
+fn paths_ending_with(paths: &[Vec<&str>], segments: &[&str]) -> Vec<String> {
+    let matches: Vec<&Vec<&str>> = paths.iter().filter(|path| path.ends_with(segments)).collect();
     let shortest = matches.iter().map(|path| path.len()).min();
     let preferred = matches.into_iter().filter(|path| Some(path.len()) == shortest);
     preferred.take(MAX_SUGGESTIONS).map(|path| path.join(".")).collect()
@@ -48,17 +48,17 @@ fn tables_of_scene<'a>(root: &Table, kinds: &'a [TableKind]) -> impl Iterator<It
 
 /// Paths of all parameters of the tables that a scene has.
 fn known_paths(root: &Table, kinds: &[TableKind]) -> Vec<Vec<&'static str>> {
-    let mut known = Vec::new();
+    let mut paths = Vec::new();
     for kind in tables_of_scene(root, kinds) {
         let stated: Vec<&Value> = root.get(kind.key).map(|node| &node.value).into_iter().collect();
-        add_parameters(&mut known, &[kind.key], (kind.table)(), &stated);
+        add_parameters(&mut paths, &[kind.key], (kind.table)(), &stated);
     }
-    known
+    paths
 }
 
 /// Adds the paths of all parameters of the table at `path`. `stated` are its values in the scene's text: several where it is a list.
 fn add_parameters(
-    known: &mut Vec<Vec<&'static str>>,
+    paths: &mut Vec<Vec<&'static str>>,
     path: &[&'static str],
     table: &TableDescriptor,
     stated: &[&Value],
@@ -67,17 +67,17 @@ fn add_parameters(
         let path = [path, &[parameter.key]].concat();
         let stated = values_of_key(stated, parameter.key);
         match &parameter.kind {
-            Kind::Table(inner) => add_parameters(known, &path, inner(), &stated),
+            Kind::Table(inner) => add_parameters(paths, &path, inner(), &stated),
             // Parameters of items can only be set if the list has items.
             Kind::List { item, .. }
                 if !stated.is_empty()
                     && let Kind::Table(inner) = **item =>
             {
-                add_parameters(known, &path, inner(), &stated);
+                add_parameters(paths, &path, inner(), &stated);
             }
             _ => {}
         }
-        known.push(path);
+        paths.push(path);
     }
 }
 
