@@ -58,6 +58,7 @@ impl EmitterColors {
     #[inline(always)]
     pub(crate) fn table_coordinate(sine: f32) -> f32 {
         let clamped = if sine > 0.0 { sine } else { 0.0 };
+        // The nearest step, rounded by the cast: 1024 steps differ too little to interpolate.
         clamped.sqrt().fma(STEPS as f32, 0.5)
     }
 
@@ -163,6 +164,7 @@ impl ChartSampler<'_> {
             return false;
         }
         let [top, bottom] = colatitudes.map(|colatitude| (self.projection.row(colatitude).max(0.0)) as u32);
+        // Two cells of margin: bilinear sampling reads half a cell further, and the casts truncate.
         (left - 2..=right + 2).all(|column| {
             let [first, end] = valid_rows[chart.wrap_column(column)];
             bottom + 2 < first || top >= end + 2
@@ -218,6 +220,7 @@ impl ColorPass<'_> {
             let [soft_first, soft_end] = self.soft_column(simd, self.chart.longitude(number) as f32, soft);
             let [mut first, mut end] = block.valid_rows[column].map(|row| row as usize);
             if soft_first < soft_end {
+                // Interpolation carries a soft row to the centers of its neighbors.
                 first = first.min(self.row_of_soft(soft_first.saturating_sub(1)));
                 end = end.max((self.row_of_soft(soft_end) + 1).min(self.chart.rows));
             }
@@ -250,6 +253,7 @@ impl ColorPass<'_> {
             return [rows, 0];
         }
         let [left, right] = pair.map(|column| &self.soft.light[column * rows..][first..end]);
+        // Bilinear in two steps: across once for the column, down for each row.
         for ((light, left), right) in column[first..end].iter_mut().zip(left).zip(right) {
             *light = lerp_emitters(simd, left, right, across).into();
         }

@@ -266,16 +266,19 @@ impl Integrator {
         const STEP: f32 = FRAME_S as f32;
         let sample = field.sample(position[0], position[1]);
         let [cosine, sine] = self.rotation;
+        // First the rotation, so that position (2.19) and velocity (2.20) start from the same velocity.
         let speed = [cosine.fma(speed[0], sine * speed[1]), cosine.fma(speed[1], -sine * speed[0])];
         let (mut to, mut new) = ([0.0; 2], [0.0; 2]);
         for c in 0..2 {
             let force = self.lorentz_weight.fma(sample.field[c], self.repulsion_weight * repulsion[c]);
             let moved = (0.5 * STEP * STEP).fma(force, STEP.fma(speed[c], position[c]));
+            // `clamp` would check its bounds for every particle.
             let clamped = if moved > -self.half_km { moved } else { -self.half_km };
             let clamped = if clamped < self.half_km { clamped } else { self.half_km };
             to[c] = if moved.is_finite() { clamped } else { position[c] };
             new[c] = self.friction_factor * STEP.fma(force, speed[c]);
         }
+        // At the position after clamping: a particle at the edge of the square gains no energy from where it would have been.
         let potential_drop = sample.potential - field.sample(to[0], to[1]).potential;
         let factor = self.energy_limit_factor(speed, new, potential_drop);
         (to, if factor > 0.0 { [new[0] * factor, new[1] * factor] } else { [0.0; 2] })
@@ -285,6 +288,7 @@ impl Integrator {
     #[inline(always)]
     fn energy_limit_factor(&self, before: [f32; 2], after: [f32; 2], potential_drop: f32) -> f32 {
         let energy = (2.0 * self.lorentz_weight).fma(potential_drop, before[0].fma(before[0], before[1] * before[1]));
+        // A particle that climbs higher than its kinetic energy allows comes to rest.
         let energy = if energy > 0.0 { energy } else { 0.0 };
         let speed_squared = after[0].fma(after[0], after[1] * after[1]);
         if !speed_squared.is_finite() {

@@ -150,6 +150,7 @@ impl NeighborCells {
     /// Sums of all particles, in sorted order; `values` and `others` are sorted too.
     fn sum<T: CellTerm>(&self, term: &T, values: &[f32], others: [&[f32]; 2]) -> Vec<[f32; 2]> {
         let (columns, level) = (self.size[0], bansho_base::math::simd::level());
+        // Only cells with particles: sheets are thin, and most of the square is empty.
         let occupied = (0..self.starts.len() - 1).filter(|cell| self.starts[*cell] < self.starts[cell + 1]);
         let occupied: Vec<usize> = occupied.collect();
         occupied

@@ -81,6 +81,7 @@ impl TrackSampler {
         let mut from_top = 0;
         let mut state = TrackState::default();
         (0..count).map(move |number| {
+            // The four words of one counter are all that a collision needs: stratum, altitude within the level, and two for the deflection.
             let words = key.words(particle, number, COLLISION);
             let energy_fraction = (number as f64 + quantile(number, uniform_f64(words[0], 0))) / count as f64;
             from_top = next_level_from_top(cumulative, from_top, energy_fraction);
@@ -105,6 +106,7 @@ impl TrackSampler {
             let energy_fraction = (number as f64 + quantile) / count as f64;
             from_top = next_level_from_top(cumulative, from_top, energy_fraction);
             let before = from_top.checked_sub(1).map_or(0.0, |above| cumulative[above]);
+            // The place of the quantile within its level, with the triangular density of the random tracks: both have the same mean between levels.
             let fraction = (energy_fraction - before) / (cumulative[from_top] - before).max(f64::MIN_POSITIVE);
             let level = LEVELS - 1 - from_top;
             let altitude_km = (level_altitude_km(level) + inverse_triangular_cdf(fraction)) as f32;
@@ -147,6 +149,7 @@ impl TrackLibrary {
             .into_par_iter()
             .map(|node| (0..TRACKS_PER_ENERGY).flat_map(|v| sampler.stratified_track(node, v, key)).collect())
             .collect();
+        // All tracks of an energy have the same number of collisions, so that only energies need an index.
         let mut starts = vec![0];
         starts.extend(by_node.iter().scan(0, |end, collisions| {
             *end += collisions.len();
@@ -172,12 +175,14 @@ impl TrackLibrary {
 
 /// Index from the top, at least `above`, of the level at which the fraction `energy_fraction` of the energy is lost.
 fn next_level_from_top(cumulative: &AltitudeProfile, above: usize, energy_fraction: f64) -> usize {
+    // Fractions only grow along a track, so the search goes on from the level of the collision before: a track passes the levels once.
     let passed = cumulative[above..LEVELS - 1].iter().take_while(|sum| **sum <= energy_fraction);
     above + passed.count()
 }
 
 /// A number in (-1, 1) with triangular density from the two halves of a word.
 fn triangular(word: u32) -> f64 {
+    // The lower half becomes the upper bits of the second number. The halves share eight bits, which are the last of the first number.
     uniform(word) as f64 + uniform(word << 16) as f64 - 1.0
 }
 

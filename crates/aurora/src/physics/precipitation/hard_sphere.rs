@@ -92,6 +92,7 @@ impl HardSphereAtmosphere {
             let words = key.words(particle, number, COLLISION);
             let deflection = normal_pair([words[2], words[3]]).map(|deviation| deviation as f64 * self.deflection);
             let slant = math::sqrt(1.0 + deflection[0] * deflection[0] + deflection[1] * deflection[1]);
+            // The free path is exponential in the column density, whatever the profile of the air, and is shorter in altitude on a slant path.
             column -= math::ln_1p(-uniform_f64(words[0], words[1])) / (self.cross_section * slant);
             while from_top < LEVELS && self.columns[from_top] < column {
                 from_top += 1;
@@ -145,6 +146,7 @@ fn poisson_below(counts: &[u32; NODES], mean: f64) -> [f64; NODES] {
     let (mut number, mut log_probability, mut sum) = (0, -mean, 0.0);
     counts.map(|count| {
         while number < count {
+            // As logarithms: exp(-mean) alone is 0 above a mean of 745, and electrons of 100 keV have 1000 collisions.
             sum += math::exp(log_probability);
             number += 1;
             log_probability += math::ln(mean / f64::from(number));

@@ -143,11 +143,13 @@ impl DistanceBins {
         let max_distance_km = if field.is_above_light() { MAX_DISTANCE_FROM_ABOVE_KM } else { MAX_DISTANCE_KM };
         let row = step * nearest_km;
         let width = (spread_km * f64::from(REACH) / BINS_PER_REACH).clamp(ROWS_PER_BIN[0] * row, ROWS_PER_BIN[1] * row);
+        // A line of sight is at z = r cot a along the field, so a bin of relative width w changes z by w z: by the same step at all distances.
         let relative_width = (STEP_KM / farthest_km).max(2.0 * step);
         let near_limit_km = (width / relative_width).min(max_distance_km);
         let near = near_limit_km / width;
         let count = (near + math::ln(max_distance_km / near_limit_km) / relative_width).ceil().max(1.0) as usize;
         let per_octave = LN_2 / relative_width;
+        // Near and far bins meet at the limit with the same coordinate.
         let far_offset = near - per_octave * math::log2(near_limit_km);
         Self {
             width,
@@ -272,8 +274,11 @@ impl<'a> SortedSources<'a> {
         sums: &mut BlockBins,
     ) {
         sums.bins.clear();
+        // Column by column: a source adds to a run of bins in each of few columns, and the integration reads one column after the other.
         sums.bins.resize(BLOCK_COLUMNS * self.bins.count, [0.0; 4]);
         sums.filled = [[usize::MAX, 0]; BLOCK_COLUMNS];
+        // One thread, in the order of the sources: the counting sort is stable and chunks come in order, so the sum has the same bits with any number
+        // of threads.
         for entries in self.entries(block) {
             for entry in entries {
                 let source = self.source(entry.source);
@@ -297,6 +302,7 @@ impl SortedChunk {
     /// Counting sort of sources, the first of which has index `first`, into blocks of `width` columns.
     fn new(spans: &[ColumnSpan], first: usize, chart: &Chart, width: usize) -> Self {
         let blocks = chart.columns.div_ceil(width);
+        // Spans are walked twice, to count and to place, which is cheaper than a growing list for each block.
         let mut starts = vec![0_u32; blocks + 1];
         for span in spans {
             for_each_block(*span, chart, width, |block, _| starts[block + 1] += 1);
@@ -347,11 +353,13 @@ impl ColumnSpan {
         if source.power == [0.0; 3] || distance > max_distance_km {
             return Self::default();
         }
+        // A margin for rounding: the root below must not be taken of a negative number.
         if reach * 1.001 >= distance {
             // It includes the observer's own field line and can be seen at any longitude.
             return Self { first: 0, count: chart.columns as i32 };
         }
         let sine = reach / distance;
+        // The arcsine of reach / distance.
         let half = approximations::atan2(sine, (1.0 - sine * sine).sqrt()) / step;
         let column = projection.column(approximations::atan2(y, x));
         let (first, end) = ((column - half - 0.5).ceil(), (column + half - 0.5).floor() + 1.0);
@@ -394,6 +402,7 @@ impl PatchWeights {
         let (mut side, mut along) = ([0.0; BLOCK_COLUMNS], [0.0; BLOCK_COLUMNS]);
         for column in 0..BLOCK_COLUMNS {
             let offset = y.fma(cosines[column], -(x * sines[column])) * per_reach;
+            // The kernel and its first derivative vanish at the edge, so that light does not jump when a moving source reaches another column.
             let shape = offset.fma(-offset, 1.0).max(0.0);
             side[column] = shape * shape * (NORM * per_reach);
             along[column] = x.fma(cosines[column], y * sines[column]);

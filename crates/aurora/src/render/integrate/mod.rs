@@ -75,6 +75,8 @@ impl ColumnBuffer {
         sorted_sources: &SortedSources,
     ) -> Self {
         let level = bansho_base::math::simd::level();
+        // Padded by a batch of knots: a batch that begins at the last row or the last knot is still a whole array, and no kernel has a remainder
+        // loop.
         let [cotangents, inverse_sines] = self.chart.row_tables(ROWS * KNOT_ROWS);
         let knots: Vec<f32> = cotangents.iter().copied().step_by(KNOT_ROWS).collect();
         let distances: Vec<_> =
@@ -95,6 +97,7 @@ impl ColumnBuffer {
             slow_height_km: field.border_distances_km(f64::from(SLOW_KM))[1] as f32,
         };
         let scratch_pool = ScratchPool::new(ProfileScratch::default);
+        // Blocks differ in their number of sources by orders of magnitude, so each is a task of its own.
         blocks.with_max_len(1).for_each(|block| {
             scratch_pool
                 .with(|scratch| dispatch!(level, simd => pass.integrate_block(simd, block, sorted_sources, scratch)));
@@ -123,6 +126,8 @@ impl KnotBuffer {
     /// Adds light at knots from index `first` on.
     #[inline(always)]
     fn add<S: Simd>(&mut self, simd: S, first: usize, knots: &[PerEmitter<f32>]) {
+        // A group stores both of its ends, although its far end is the next group's near end: the bin may stop there while other bins go on, and a
+        // group must not be interpolated toward light that its bin does not have. Both ends are also one vector of eight, loaded and stored once.
         self.valid_groups = [self.valid_groups[0].min(first), self.valid_groups[1].max(first + knots.len() - 1)];
         for (sum, ends) in self.light[first..].iter_mut().zip(knots.windows(2)) {
             let sum = sum.as_flattened_mut();
@@ -174,6 +179,7 @@ impl ProfilePass<'_> {
             let light = &mut block.light[column * self.chart.rows..][..self.chart.rows];
             // The last knots may extend past the valid rows.
             slow.add_to(simd, &mut light[..end]);
+            // The 1 / sin a of the integral depends on the row alone: once per column, not once per bin.
             for (light, inverse) in light[valid.clone()].iter_mut().zip(&self.inverse_sines[valid]) {
                 for value in light {
                     *value *= inverse;
@@ -196,9 +202,12 @@ impl ProfilePass<'_> {
     ) {
         let [green, red, prompt, by_node] = *bin;
         let all = green + red + prompt;
+        // An empty bin has no mean energy.
         if all <= 1e-12 {
             return;
         }
+        // One profile for all sources of the bin, that of their mean node. A sum of profiles would make the integral proportional to sources times
+        // rows; energies of neighbors differ little.
         let profile = self.profiles.at(by_node / all, red > 0.0);
         let [distance, width] = self.distances[number];
         let line = meridian.line(distance);
@@ -207,6 +216,7 @@ impl ProfilePass<'_> {
         let blurred = f64::from(self.bins.smoothing_km(distance as f32));
         let top = self.row_of_altitude(&line, distance, -blurred, profile.top_km);
         let bottom = self.row_of_altitude(&line, distance, blurred, profile.bottom_km);
+        // Rows are counted from their centers, so a row belongs to the bin if its center is between the borders.
         let end = ((bottom.floor() + 1.0).max(0.0) as usize).min(self.chart.rows);
         let first = top.ceil().max(0.0) as usize;
         if first >= end {
@@ -228,7 +238,9 @@ impl ProfilePass<'_> {
             weights,
             shadow,
         };
+        // From the first row of a group of knots on, since the interpolated light fills whole groups.
         let light = block.extend_valid_rows(column, &(first / KNOT_ROWS * KNOT_ROWS..end), self.chart.rows);
+        // Near the magnetic zenith the altitude changes too fast from row to row for knots.
         let rest = if near { first } else { self.add_knot_rows(&bin_rows, first..end, slow) };
         self.add_dense_rows(&bin_rows, rest, &mut light[rest.min(end)..end]);
         if near {
@@ -244,6 +256,8 @@ impl ProfilePass<'_> {
     fn add_knot_rows<S: Simd>(&self, bin_rows: &BinRows<S>, rows: Range<usize>, slow: &mut KnotBuffer) -> usize {
         let distance = bin_rows.distance;
         // Altitude difference between knots.
+        // On a field line at distance r, a point at height h above or below the observer moves along it by (h^2 + r^2) / r for each radian of
+        // colatitude.
         let knot_km = (KNOT_ROWS as f32 * self.chart.row_step as f32)
             * (self.slow_height_km * self.slow_height_km / distance + distance);
         let end = self.row_of_altitude(
@@ -263,6 +277,7 @@ impl ProfilePass<'_> {
             let mut light = [[0.0; 4]; ROWS];
             bin_rows.add(cotangents, &mut light[..count]);
             slow.add(bin_rows.weights.simd, knot, &light[..count]);
+            // Batches share a knot: what is added are pairs of neighboring knots.
             knot += count - 1;
         }
         last * KNOT_ROWS
@@ -314,9 +329,11 @@ impl<S: Simd> BinRows<'_, S> {
         let [constant, linear] = self.line.quadratic();
         let mut altitudes = [0.0; ROWS];
         for i in 0..ROWS {
+            // The squared distance from the Earth's center is a quadratic of the coordinate along the field, which is r cot a.
             let position = self.distance * cotangents[i];
             altitudes[i] = altitude(position.fma(position + linear, constant)) - BOTTOM_KM;
         }
+        // A loop of its own, so that both are vectorized; most observers are below the light and skip it.
         if let Some(shadow) = &self.shadow {
             for i in 0..ROWS {
                 // Below all tables, where nothing shines.
@@ -335,6 +352,7 @@ impl<S: Simd> BinRows<'_, S> {
         let mip_levels = self.mip_levels(cotangents);
         for i in 0..light.len() {
             let profile = self.profile_in_front(altitudes[i]);
+            // Entries of level m are 2^m km apart. The first is dark, so the lowest altitude is at the second.
             let altitude = altitudes[i].fma(approximations::exp2(-mip_levels[i]), 1.0);
             self.add_row(profile.table(mip_levels[i] as usize), altitude, &mut light[i]);
         }
@@ -356,6 +374,8 @@ impl<S: Simd> BinRows<'_, S> {
         let mut mip_levels = [0.0; ROWS];
         for i in 0..ROWS {
             let step = self.width * cotangents[i].abs();
+            // Entries about as wide as the step filter out what neighboring bins would alias. Small steps take two thirds of their width, so that the
+            // lower border stays sharp; beyond SMOOTH_KM entries are wider than the step, up to twice.
             let entry = step * (step * (1.0 / SMOOTH_KM)).clamp(ENTRY_PER_STEP[0], ENTRY_PER_STEP[1]);
             mip_levels[i] = approximations::log2(entry.max(1.0)).ceil().min(MAX_LEVEL);
         }
@@ -373,6 +393,7 @@ impl<S: Simd> BinRows<'_, S> {
     /// Adds the light at a fractional entry of `table`, whose ends are 0.
     #[inline(always)]
     fn add_row(&self, table: &[PerEmitter<f32>], altitude: f32, light: &mut PerEmitter<f32>) {
+        // Clamped to the dark entries at both ends, instead of a test whether the altitude is within the profile. NaN, too, becomes dark.
         let altitude = altitude.max(0.0).min((table.len() - 1) as f32);
         let entry = (altitude as usize).min(table.len() - 2);
         let fraction = altitude - entry as f32;

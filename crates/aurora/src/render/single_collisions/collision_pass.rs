@@ -152,6 +152,7 @@ impl CollisionRenderer {
         blocks.sort_by_key(|(count, _)| *count);
         let blocks = Mutex::new(blocks);
         (0..parallel::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
+            // Memory of a whole block: only threads that get one allocate it.
             let mut scratch = None;
             loop {
                 // A statement of its own, so that the lock is released before the block is drawn.
@@ -169,6 +170,7 @@ impl CollisionRenderer {
     fn track(&self, source: FieldLineSource, step: u32) -> SourceTrack<'_> {
         let [a, b, c, d] = self.key.words(u64::from(source.random_key), step, SOURCE);
         let below = (source.energy_node as usize).min(NODES - 2);
+        // One of the two nodes at random, so that the mean over sources is linear between them and the tables need no interpolation.
         let central_node = below + usize::from(uniform(a) < source.energy_node - below as f32);
         // Energies above the tables use the highest node: its collision count and weight belong together.
         let node = self.deposition.sample_node_around(central_node, uniform_f64(b, d)).min(self.tracks.highest_node());
@@ -178,6 +180,7 @@ impl CollisionRenderer {
             batches,
             pairs: self.pairs[node],
             spread_squared: self.spread_squared[node],
+            // The lowest bits of the word have chosen the track.
             first: (c >> 8) as usize / SPLAT_LANES,
         }
     }
@@ -278,6 +281,8 @@ impl CollisionPass<'_> {
                 sources.push(*self.sorted_sources.source(entry.source));
             }
             tracks.clear();
+            // Loops of their own: the loads of one are independent of each other, so that their cache misses overlap. A single loop would wait for a
+            // source, then for its track, before it projects.
             for source in &sources {
                 tracks.push(self.collisions.track(*source, self.step));
             }
@@ -300,6 +305,7 @@ impl CollisionPass<'_> {
         let source = &track.source;
         let [green, red, prompt] = source.power;
         let powers = FourLanes::simd_from(simd, [green, red, prompt, prompt]);
+        // Brightness per radian of colatitude: the weights of the rows that share the light of a collision add up to 1.
         let weights = powers * (track.pairs / self.chart.row_step as f32);
         // A distant source has nearly the same meridian in all columns.
         let shared = source.distance() >= PER_COLUMN_REACHES * source.reach;
@@ -371,10 +377,14 @@ impl CollisionPass<'_> {
         let mut deviations = track.first;
         for batches in track.batches.chunks(PIPELINED_BATCHES) {
             for (batch, points) in batches.iter().zip(&mut *points) {
+                // Deviations from a table of 16 KiB, which stays in the first-level cache, instead of random numbers for every collision. Tracks
+                // start at different batches of it.
                 let deviation = Lanes::from_slice(simd, &self.collisions.deviations[deviations % DEVIATIONS]);
                 deviations += 1;
                 let offsets = Lanes::from_slice(simd, &batch.offsets_km) + Lanes::splat(simd, distance_offset);
                 let offsets = deviation.fma(Lanes::splat(simd, kernel_reach), offsets);
+                // First only projections, whose results are independent, then only sums, whose stores hit the same rows: the former hide the latency
+                // of the latter.
                 points.project(line.points(batch, offsets), last, rasterizer.odd_pairs(), &mut row_range);
             }
             for (batch, points) in batches.iter().zip(&*points) {

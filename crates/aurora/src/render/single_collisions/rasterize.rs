@@ -54,6 +54,8 @@ impl TrackRasterizer {
     pub(super) fn new(rows: usize) -> Self {
         let height = rows.div_ceil(QUAD_ROWS) + 1 + SPLAT_LANES;
         let quads = 2 * height + 1;
+        // One quad more than needed, so that the first can begin at a cache line: a vector of floats is aligned to four bytes only, and loads that
+        // cross cache lines are two accesses.
         let light = vec![0.0; QUAD_LIGHT * (quads + 1)];
         Self {
             start: light.as_ptr().align_offset(align_of::<RowQuad>()).min(QUAD_LIGHT),
@@ -98,6 +100,7 @@ impl TrackRasterizer {
         let pairs = light.len().min(self.touched.len());
         // Local references: else the compiler must assume that the stores alias the fields.
         let mut sums = RowPairSums { light: &mut light[..pairs], touched: &mut self.touched[..pairs], photons };
+        // Only the last batch of a track is not full.
         if count < SPLAT_LANES {
             for lane in 0..count {
                 sums.add(simd, points, lane, photon_rows[lane]);
@@ -132,11 +135,13 @@ impl TrackRasterizer {
             // The second and third odd pair of a quad are at the next byte.
             let [touched_even, touched_odd, touched_next_odd] =
                 [&*even, &odd[..2 * SPLAT_LANES], &odd[1..]].map(|bytes| u8x32::from_slice(simd, bytes));
+            // A quad has two even and two odd pairs, each with a byte: read as 16 bits, a lane is a quad.
             let touched: u16x16<S> = (touched_even | touched_odd | touched_next_odd).bitcast();
             none.store_slice(even);
             none.store_slice(&mut odd[..2 * SPLAT_LANES]);
             let quads = quads + from as u16;
             let lit = touched.simd_gt(0) & quads.simd_lt(end as u16);
+            // All lanes are stored and the list grows by the number of lit ones, without a branch. It has room for a batch more.
             quads.compress(lit).store_slice(&mut self.active[self.active_count..][..SPLAT_LANES]);
             self.active_count += lit.to_bitmask().count_ones() as usize;
         }
@@ -190,7 +195,10 @@ impl RowPairSums<'_> {
         else {
             return;
         };
+        // Stored always: a test whether it is set already would be mispredicted.
         *touched = 1;
+        // Both weights are one word, so one broadcast loads them; the shuffle stays within blocks of 128 bits, where it takes one instruction on all
+        // machines.
         let weights: HalfLanes<S> = u64x4::splat(simd, points.weights[lane]).bitcast();
         let weights = weights.swizzle_dyn_within_blocks(u8x32::from_slice(simd, &SPREAD));
         let photons = FourLanes::simd_from(simd, *photons);
@@ -249,6 +257,7 @@ impl SplatBatch {
         let (no_min, no_max) = (rows.broadcast(f32::INFINITY), rows.broadcast(-1.0));
         row_range.min = row_range.min.simd_min(inside(rows, end, [whole, no_min]));
         row_range.max = row_range.max.simd_max(inside(rows, end, [whole, no_max]));
+        // Points outside go to rows below the chart, two apart, so that no two lanes of a batch add to the same pair.
         let row = round_to_u32(inside(rows, end, [whole, outside]));
         (((row + 1) >> 1) + (row & 1) * odd_pairs).store_slice(&mut self.pairs);
         let weights = inside(rows, end, [brightness, zero]);

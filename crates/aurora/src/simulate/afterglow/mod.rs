@@ -150,6 +150,7 @@ impl<const ALTITUDES: usize> Tile<ALTITUDES> {
     /// Applies the decay of one step. Returns the gain of the particles' power, and whether the tile is dark: no cell has as
     /// much power as `dark_w` would add.
     fn fade(&mut self, decay: &DecayFactors<ALTITUDES>, dark_w: f32) -> ([f32; ALTITUDES], bool) {
+        // One factor for the whole tile, so that the loop below multiplies vectors by a constant.
         let decay_factors = decay.of(self.energy_ev());
         for values in self.powers.iter_mut().chain(&mut self.weighted) {
             for (value, factor) in values.iter_mut().zip(decay_factors) {
@@ -249,6 +250,7 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
             let Some(mut lit) = self.cell(tile, cell) else { continue };
             let [column, row] = self.column_and_row(tile, cell).map(|position| position / block * block);
             lit.cell_index = self.number_of([column, row]);
+            // Blocks never reach into another tile, since their side divides that of a tile: a tile is merged without its neighbors.
             let block_number = &mut numbers[cell / TILE_SIDE / block * TILE_SIDE + cell % TILE_SIDE / block];
             if *block_number == usize::MAX {
                 *block_number = blocks.len();
@@ -360,6 +362,8 @@ impl<const ALTITUDES: usize> AfterglowMap<ALTITUDES> {
         let mut number = 0;
         while number < self.tiles.len() {
             if dark[number] {
+                // The last tile takes the place of the freed one, so that tiles stay dense; the order of tiles depends on the history only, never on
+                // threads.
                 gain.swap_remove(number);
                 dark.swap_remove(number);
                 self.numbers[self.tiles[number].tile_position as usize] = NO_TILE;

@@ -55,6 +55,7 @@ impl PoissonSolver {
             *diagonal = (4.0 * sine).mul_add(sine, area.mul_add(screening, 2.0));
         }
         let mut factors = Vec::with_capacity(columns * rows);
+        // The factors of the elimination depend on the matrix only, so that a solve needs no division.
         let mut above = vec![0.0; columns];
         for _ in 0..rows {
             above.iter_mut().zip(&diagonals).for_each(|(factor, diagonal)| *factor = 1.0 / (diagonal - *factor));
@@ -95,6 +96,7 @@ impl PoissonSolver {
     fn eliminate(&self, grid: &mut Grid2, scale: f64) {
         let scale = if cfg!(feature = "broken-kernel") { -scale } else { scale };
         let columns = self.size[0];
+        // The elimination goes row by row, but wave numbers are independent: a task takes some columns through all rows, which vectorizes along them.
         let mut blocks: Vec<Vec<&mut [f64]>> = Vec::new();
         blocks.resize_with(columns.div_ceil(TASK_COLUMNS), Vec::new);
         for row in grid.values_mut().chunks_mut(columns) {
@@ -216,6 +218,7 @@ impl SineTransform {
         let (first, second) = rows.split_at_mut(self.sines.len() - 1);
         let spectrum = &mut scratch.spectrum;
         dispatch!(self.level, _simd => self.fold(first, second, spectrum));
+        // Two real rows in one complex transform: their spectra are the Hermitian and the anti-Hermitian part of its result.
         self.fourier.process_with_scratch(spectrum, &mut scratch.inner);
         unfold(first, |k, mirror| {
             let (one, other) = (spectrum[k], spectrum[mirror]);

@@ -138,6 +138,7 @@ impl FieldBuilder {
         let unit = density / full_cell_count(counts).max(1.0);
         // In the middle of a long, straight, isolated sheet.
         let reach = self.reach_km();
+        // A slab of half-thickness d in a medium with screening length l has the potential -rho l^2 (1 - exp(-d / l)) in its middle.
         let potential = density * reach * reach * (math::exp(-half_thickness / reach) - 1.0);
         let target = ChargeTarget { potential, density, half_thickness };
         let mut charge =
@@ -210,6 +211,7 @@ impl FieldBuilder {
         if field.noise == 0.0 {
             return;
         }
+        // Relative to the depth of the potential: the noise disturbs a weak field as much as a strong one.
         let depth = potential.values().iter().fold(0.0_f64, |low, value| low.min(*value)).abs();
         let scale = potential.spacing() / field.noise_scale_km;
         let columns = potential.size()[0];
