@@ -124,6 +124,7 @@ fn directional([x, y, z]: &[f32; 3], segments: &Segments, extinction: f32) -> La
     let mut factors = [0.0; LANES];
     for i in 0..LANES {
         let cosine = x.fma(xs[i], y.fma(ys[i], z * zs[i]));
+        // The transmittance from the camera to the beginning is applied when the layers are composited.
         let passed = approximations::exp(-extinction * (segments.end[i] - segments.begin[i]));
         factors[i] = phase_function(cosine) * (1.0 - passed);
     }
@@ -145,6 +146,8 @@ impl SegmentsFromLight {
         let [xs, ys, zs] = &segments.directions;
         for i in 0..LANES {
             let nearest = x.fma(xs[i], y.fma(ys[i], z * zs[i]));
+            // The height of the light over the line by a cross product: as the difference of squares of the distance and of its part along the line
+            // it would cancel in single precision.
             let across = [y * zs[i] - z * ys[i], z * xs[i] - x * zs[i], x * ys[i] - y * xs[i]];
             let square = across[0].fma(across[0], across[1].fma(across[1], across[2] * across[2]));
             let height = square.sqrt().simd_max(MIN_DISTANCE);
@@ -157,6 +160,7 @@ impl SegmentsFromLight {
             let half_angle = 0.5 * approximations::atan2(sideways, along);
             let turns = half_angle * TURNS_PER_RADIAN;
             let (sine, cosine) = (approximations::sin_turns(turns), approximations::cos_turns(turns));
+            // The direction to the middle, by the addition theorem from that to the beginning: no second arctangent.
             let inverse = 1.0 / height.fma(height, first * first).sqrt();
             let (first_cosine, first_sine) = (height * inverse, first * inverse);
             (from_light.height[i], from_light.first[i], from_light.half_angle[i]) = (height, first, half_angle);
@@ -181,6 +185,7 @@ impl SegmentsFromLight {
             any_small |= is_small;
             any_large |= !is_small;
         }
+        // Both rules for all lanes if any lane needs them: a branch for each lane would not be vectorized.
         let few = if any_small { self.integrate(&FEW_NODES, min_square, cone, extinction) } else { [0.0; LANES] };
         let many = if any_large { self.integrate(&MANY_NODES, min_square, cone, extinction) } else { [0.0; LANES] };
         let mut factors = [0.0; LANES];
@@ -195,6 +200,7 @@ impl SegmentsFromLight {
     fn integrate(&self, nodes: &[[f64; 2]], min_square: f32, cone: Option<&Cone>, extinction: f32) -> LaneArray {
         let mut sums = [0.0; LANES];
         for [node, weight] in nodes {
+            // The nodes are symmetric: one sine and one cosine serve both sides of the middle.
             let turns_per_half_angle = *node as f32 * TURNS_PER_RADIAN;
             let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
             for i in 0..LANES {
@@ -210,6 +216,8 @@ impl SegmentsFromLight {
             }
         }
         for i in 0..LANES {
+            // With s = s0 + h tan a, ds / r^2 is da / h: what is left of the inverse-square law is a constant of the line. Half the angle scales the
+            // nodes on [-1, 1].
             sums[i] *= extinction * self.half_angle[i] * self.inverse_height[i];
         }
         sums
@@ -234,6 +242,7 @@ impl SegmentsFromLight {
             let sine = side * sines[i];
             let cosine = middle_cosine[i] * cosines[i] - middle_sine[i] * sine;
             let sine = middle_sine[i] * cosines[i] + middle_cosine[i] * sine;
+            // At a right angle an endless segment is infinitely far away.
             let cosine = cosine.simd_max(1e-7);
             (distance[i], inverse[i]) = (self.height[i] / cosine, cosine * self.inverse_height[i]);
             along[i] = sine * distance[i];
@@ -244,6 +253,7 @@ impl SegmentsFromLight {
             // From the light to the point, and from there to the beginning of the segment: the fog in front of it has been drawn already.
             let depth = extinction * ((along[i] - self.first[i]).simd_max(0.0) + distance[i]);
             let square = distance[i] * distance[i];
+            // Within the radius of the light its illuminance does not grow any more: the factor takes back what the substitution has divided out.
             let form = (square * inverse_min_square).simd_min(1.0);
             integrand[i] = form * phase[i] * approximations::exp(-depth);
         }

@@ -123,6 +123,7 @@ impl PreparedGround<'_> {
                 if let Some(batches) = rows[row].get() {
                     return batches[batch];
                 }
+                // Computed before `get_or_init`, within which other threads would have to wait; two that compute the same row get the same numbers.
                 let light = self.light_row(simd, y);
                 rows[row].get_or_init(|| light)[batch]
             }
@@ -179,6 +180,7 @@ impl PreparedGround<'_> {
         for value in weight {
             largest = if value > largest { value } else { largest };
         }
+        // Nothing is mirrored, as between puddles: sampling the picture is most of the work.
         if largest <= 0.0 {
             return;
         }
@@ -209,6 +211,7 @@ impl PreparedGround<'_> {
         let slopes = lake.waves.slopes([&xs, &zs], &footprint);
         let (xs, ys) = pixel_centers(pixel);
         let sharp = sampled(lake.reflection);
+        // The blur contains all directions of the unresolved waves, so it is sampled where the level water shows it, not displaced.
         let blurred = SampledImage { image: &lake.blurred_reflection, ..sharp }.at(simd, &xs, &ys);
         let (xs, ys) = self.reflected_pixels(simd, hits, &slopes, (xs, ys));
         let mut mirrored = sharp.at(simd, &xs, &ys);
@@ -238,6 +241,7 @@ impl PreparedGround<'_> {
         let along = vx.fma(sx, vz.fma(sz, zero - vy)) * Lanes::splat(simd, 2.0)
             / sx.fma(sx, sz.fma(sz, Lanes::splat(simd, 1.0)));
         let x = along.fma(sx, zero - vx);
+        // In the picture of the mirror up is down. A reflection that would point into the water is folded back.
         let y = zero - (zero - vy - along).simd_abs();
         let z = along.fma(sz, zero - vz);
         if self.view.camera.lens == Lens::Perspective {

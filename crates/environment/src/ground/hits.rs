@@ -55,6 +55,8 @@ impl<S: Simd> Hits<S> {
         // A pixel subtends about 1 / focal radians.
         let below_horizon = viewer[1].fma(focal_lanes, Lanes::splat(simd, 0.5)).simd_clamp01();
         let coverage = below_horizon * Lanes::from_slice(simd, &in_view);
+        // At least that of half a pixel below the horizon, so that neither the distance nor the footprint of a pixel that the horizon cuts is
+        // infinite.
         let cos = viewer[1].simd_max(Lanes::splat(simd, 0.5 / focal));
         let height = Lanes::splat(simd, camera_height as f32);
         let distance = (height / cos).simd_min(Lanes::splat(simd, (HORIZON * 0.5) as f32));

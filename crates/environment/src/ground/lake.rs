@@ -38,6 +38,7 @@ pub(super) fn blurred_reflection(reflection: SampledImage, view: &View, slope: f
     let columns: Vec<Vec<[f32; 4 * COLUMNS]>> = (0..width.div_ceil(COLUMNS))
         .into_par_iter()
         .map(|block| {
+            // Down the picture, eight columns are two cache lines wide: a single one would load each line of cache four times.
             let mut column = columns_with_coverage(image, block * COLUMNS, &elevation_sines);
             dispatch!(level, _simd => blur(&mut column, sigma));
             column
@@ -189,12 +190,15 @@ impl Waves {
                 let resolved = smoothstep(2.0, 6.0, wave.length / footprint);
                 visibility[i] = resolved;
                 largest = if resolved > largest { resolved } else { largest };
+                // The amplitude is scaled by what is resolved, so the variance that is left is 1 minus its square.
                 slopes.unresolved[i] += (-resolved).fma(resolved, 1.0) * (1.0 / WAVE_COUNT as f32);
             }
+            // Far from the camera no lane resolves the short waves: their cosines, the dearest part, are left out.
             if largest <= 0.0 {
                 continue;
             }
             for i in 0..LANES {
+                // Phases are relative to a point below the camera, in turns: near it, where waves are resolved, single precision is enough.
                 let turns = xs[i].fma(wave.turns_per_meter[0], zs[i].fma(wave.turns_per_meter[1], wave.phase));
                 let height = visibility[i] * approximations::cos_turns(turns);
                 slopes.resolved[0][i] = height.fma(wave.slope[0], slopes.resolved[0][i]);

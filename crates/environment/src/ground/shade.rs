@@ -119,6 +119,7 @@ impl PreparedGround<'_> {
         self.add_lights(simd, hits, film.as_ref(), shadows.as_ref(), &mut light);
         let puddle = Lanes::from_slice(simd, &samples.puddle);
         let one = Lanes::splat(simd, 1.0);
+        // A puddle mirrors the picture instead, so that the film and the puddle share the ground.
         let glossy = (one - puddle) * Lanes::splat(simd, self.wetness as f32);
         let albedo = self.albedo(simd, samples);
         let mut batch = [[0.0; LANES]; 4];
@@ -282,6 +283,7 @@ impl PreparedGround<'_> {
         for light in &self.lights {
             let arriving = light.arriving(simd, &hits.offset);
             let mut factor = arriving.factor;
+            // Spots leave most of the ground dark, and shadows are the dearest part of a light.
             if !any_positive(factor) {
                 continue;
             }

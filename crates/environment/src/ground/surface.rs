@@ -93,8 +93,11 @@ impl GroundPositions<'_> {
         let origin = [self.origin.x / size + shift[0], self.origin.y / size + shift[1]];
         let (mut cells, mut fractions) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
         for axis in 0..2 {
+            // The camera's own cell and fraction are exact; lanes add their small distances to it in single precision, so that the pattern is as fine
+            // a thousand kilometers from the origin.
             let Coordinate { cell, fraction } = Coordinate::from_f64(origin[axis]);
             for i in 0..LANES {
+                // Lanes without visibility may be a million cells away, where the cast would overflow.
                 let distance = if visibility[i] > 0.0 { self.offset[axis][i] } else { 0.0 };
                 let moved = distance.fma(per_meter, fraction).clamp(-FAR, FAR);
                 let whole = moved.floor();
@@ -188,6 +191,7 @@ impl Surface {
             samples.shade[i] = approximations::exp(texture * grain[i]);
             // Water collects where the relief is low.
             let puddle = 1.0 - smoothstep(level - 0.12, level + 0.12, relief[i]);
+            // Faded to the mean, so that ground too far to be resolved is as wet as near ground.
             samples.puddle[i] = (puddle - puddles).fma(patches[i], puddles);
             // Films have sharp edges and strong highlights: filtered earlier, so that the horizon has no flicker of
             // dashes.
@@ -217,6 +221,7 @@ impl Surface {
                 }
             }
             for i in 0..LANES {
+                // The bumps that are resolved tilt the film, all others roughen it: the variance of the slope is the same at all distances.
                 let resolved = visibility[i] * amplitude as f32;
                 variance[i] = (-resolved).fma(resolved, variance[i]);
             }

@@ -144,6 +144,7 @@ impl Triangle {
         let [u_edge, v_edge] = self.edges;
         let across = ray.direction.cross(v_edge);
         let determinant = u_edge.dot(across);
+        // Only a ray within the plane of the triangle: a tolerance would open cracks where a surface is seen edge on.
         if determinant.abs() < 1e-300 {
             return None;
         }
@@ -223,9 +224,12 @@ impl TriangleBvh {
         let [low, high] = bounding_box(inside.iter().map(|triangle| [triangle.middle(); 2]));
         let axis = (0..3).fold(0, |best, axis| if (high - low)[axis] > (high - low)[best] { axis } else { best });
         let half = (end - first) / 2;
+        // Split at the median, not by surface area: the depth is then the logarithm of the number of triangles, and the stack of a ray has a fixed
+        // size.
         inside.select_nth_unstable_by(half, |a, b| a.middle()[axis].total_cmp(&b.middle()[axis]));
         self.split(first, first + half);
         (self.nodes[node].count, self.nodes[node].axis) = (0, axis);
+        // Depth first: the first child is the next node, so that only the place of the second is stored.
         self.nodes[node].first = self.nodes.len();
         self.split(first + half, end);
     }
@@ -260,6 +264,7 @@ impl TriangleBvh {
             }
             for triangle in &self.triangles[node.first..node.first + node.count] {
                 if let Some(hit) = triangle.intersect(ray, [from, to]) {
+                    // The interval shrinks with each hit, so that boxes behind it are skipped.
                     (to, nearest) = (hit.t, Some(hit));
                 }
             }
@@ -274,6 +279,7 @@ impl Node {
     fn meets(&self, ray: &Ray, inverse: DVec3, [from, to]: [f64; 2]) -> bool {
         let (a, b) = ((self.low - ray.origin) * inverse, (self.high - ray.origin) * inverse);
         let (enter, leave) = (a.min(b), a.max(b));
+        // All slabs at once, without a branch: a ray misses the box if it leaves one slab before it has entered all.
         from.max(enter.x).max(enter.y).max(enter.z) <= to.min(leave.x).min(leave.y).min(leave.z)
     }
 }

@@ -167,6 +167,7 @@ impl<'a> UntracedSolids<'a> {
         let poses = std::slice::from_ref(&self.pose);
         let tracer = Tracer { poses, shading: &self.shading, rects: &self.rects, moving: &[] };
         let mut pixels = Vec::with_capacity(rect.width * rect.height);
+        // Two rows of corners at a time: those of a whole picture would be another 40 bytes for each pixel.
         let mut rows = [vec![None; rect.width + 1], vec![None; rect.width + 1]];
         if !rect.is_empty() {
             tracer.corner_row([rect.x, rect.y], &mut rows[1]);
@@ -267,9 +268,12 @@ impl Tracer<'_> {
             // Evenly spaced in time: ray i is at the time 7 i modulo 32.
             return self.supersampled::<MOTION_SAMPLES>(position, &[2, 6, 10, 14, 18, 22, 26, 30]);
         }
+        // Corners are shared by four pixels, so that a pixel within a surface takes two rays.
         if corners.iter().any(|corner| !is_smooth(corners[0], *corner)) {
             return self.supersampled::<EDGE_SAMPLES>(position, &[0]);
         }
+        // What is smaller than a pixel may lie between corners that show the same: the ray through the middle finds some of it, and is needed for
+        // shading anyway.
         let center = self.middle().seen(position + 0.5);
         if !is_smooth(corners[0], center.map(|surface| (surface.index, surface.normal))) {
             return self.supersampled::<EDGE_SAMPLES>(position, &[0]);
@@ -292,6 +296,8 @@ impl Tracer<'_> {
             *sample = pose.seen(position + sample_offset(index, N)).map(|surface| (surface, pose));
         }
         let corners = samples.map(|sample| sample.map(|(surface, _)| (surface.index, surface.normal)));
+        // Rays are cheap, but shading casts shadows of all lights: one smooth surface is shaded at few of its rays, unless lights move during the
+        // exposure.
         let is_one = corners.iter().all(|corner| is_smooth(corners[0], *corner))
             && !(self.shading.lights_move() && self.poses.len() > 1);
         let hits = samples.iter().flatten().count();
@@ -302,6 +308,7 @@ impl Tracer<'_> {
         for (index, (surface, pose)) in samples.iter().flatten().enumerate() {
             let shades = if is_one { shaded.contains(&index) } else { true };
             if shades {
+                // The mean of what hits: coverage is applied when the scene without obstacles is mixed in.
                 let weight = if is_one { 1.0 / shaded.len() as f32 } else { 1.0 / hits as f32 };
                 let radiance = self.shading.radiance(surface, pose);
                 (0..3).for_each(|c| pixel.radiance[c] += radiance[c] * weight);

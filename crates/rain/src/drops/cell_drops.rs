@@ -59,6 +59,7 @@ impl CellDrops {
             key,
             purpose: class.purpose(DROP),
             contents,
+            // Of the largest density, not the current one: when the rate changes, drops fade in and out where they are, instead of changing places.
             count: random::poisson(class.max_density * class.lattice.volume(), [words[0], words[1]]) as usize,
             state: shutter_state.cell_state(class, cell),
             rising: ((1.0 + FADE_IN) * class.fraction) as f32,
@@ -78,6 +79,7 @@ impl CellDrops {
         let [x, y, z, threshold] = self.key.uniforms_of_steps(self.contents, first as u32, self.purpose);
         let mut presence = ZERO_LANES;
         for i in 0..LANES {
+            // The threshold belongs to the drop for its life, so that a rising rate only adds drops.
             let risen = ((self.rising - threshold[i]) * (1.0 / FADE_IN) as f32).simd_clamp01();
             presence[i] = if first + i < self.count { risen } else { 0.0 };
         }

@@ -48,6 +48,7 @@ impl GustField {
         let (mut spans, mut first, mut last) = ([[(0, 0.0); 3]; ENDS], usize::MAX, 0);
         for end in 0..ENDS {
             for time in 0..3 {
+                // Without bends only the middle of the exposure is looked up, a third of the nodes and weights: its ends follow from the velocity.
                 if BENDS || time == 1 {
                     spans[end][time] = self.span(time, axis, coordinates[end][time]);
                     (first, last) = (first.min(spans[end][time].0), last.max(spans[end][time].0));

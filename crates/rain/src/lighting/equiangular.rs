@@ -160,6 +160,7 @@ impl SightLineIntegrator<'_> {
                 Emitter::Point { .. } | Emitter::Spot { .. } => self.add_lamp(light, direction, sums),
             }
         }
+        // Sums from the eye on: the light of any part of the line is then a difference of two of them, wherever a slice is cut.
         for k in 1..sums.len() {
             for c in 0..3 {
                 sums[k][c] += sums[k - 1][c];
@@ -176,10 +177,12 @@ impl SightLineIntegrator<'_> {
         let mut batch = SampleBatch::EMPTY;
         for (index, interval) in self.intervals.iter().enumerate() {
             let u = (interval.start - lamp.nearest) as f32;
+            // The angle between both ends as one arctangent: a difference of two would cancel for short intervals far from the lamp.
             let angle = approximations::atan2(h * interval.width, h.fma(h, u * (u + interval.width)));
             let samples = (angle * (1.0 / SAMPLE_ANGLE)).ceil().simd_max(1.0);
             let step = angle / samples;
             for sample in 0..samples as i32 {
+                // Samples of different intervals share a batch: most intervals have a single one, and lanes would be idle.
                 batch.push(index, interval, u, step * (sample as f32 + 0.5), step);
                 if batch.count == LANES {
                     self.add_batch(light, &lamp, climb, &batch, sums);
@@ -205,6 +208,7 @@ impl SightLineIntegrator<'_> {
             return;
         }
         for i in 0..LANES {
+            // The table is uniform in the sine of half the angle, which resolves the peak of the phase function around straight on.
             let scattered = self.scattering.at_half_sine(half_sines[i]);
             let sum = &mut sums[batch.interval[i] as usize + 1];
             for c in 0..3 {
@@ -223,9 +227,12 @@ impl SightLineIntegrator<'_> {
             let turns = batch.angle[i] * TURNS_PER_RADIAN;
             let (sine, cosine) = (approximations::sin_turns(turns), approximations::cos_turns(turns));
             let from = batch.u[i];
+            // h tan(a + angle) less h tan a, as one quotient: the difference of the tangents would cancel. It is clamped, since rounding may lead out
+            // of the interval.
             let advance = sine * from.fma(from, h * h) / h.fma(cosine, -(from * sine));
             let advance = advance.simd_max(0.0).simd_min(batch.width[i]);
             let u = from + advance;
+            // ds = (h^2 + u^2) / h da.
             let length = batch.step[i] * u.fma(u, h * h) / h;
             let square = u.fma(u, lamp.height_squared);
             let r = square.sqrt().simd_max(1e-9);

@@ -43,6 +43,7 @@ impl HaloCorrector<'_> {
     pub(super) fn row(&self, y: usize, columns: Range<usize>, plate: &[f32], rows: &mut HaloRows) -> Vec<[f32; 3]> {
         let mut corrections = vec![[0.0; 3]; columns.len()];
         self.interpolate_rows(y, rows);
+        // Batches are aligned to the picture, so that a crop changes no pixel.
         for first in (columns.start / LANES * LANES..columns.end).step_by(LANES) {
             let visible = first.max(columns.start)..(first + LANES).min(columns.end);
             let mut depths = ZERO_LANES;
@@ -84,6 +85,8 @@ impl HaloCorrector<'_> {
         if !any_range(&ranges) || !segments.any_lit() {
             return corrections;
         }
+        // The finer grid holds the light times the distance of the ray from the lamp, which is smooth; the exact distance of each pixel is divided
+        // out here.
         let inverse_distances = self.inverse_ray_distances(&directions);
         for i in 0..LANES {
             if fades[i] <= 0.0 {

@@ -48,6 +48,7 @@ impl InScattering {
 
     /// The light of some lamps at the corners of the picture's grid. Far from all lamps in the picture, every second corner is enough.
     fn over_picture(integrator: &SightLineIntegrator, tiles: &TileGrid, lights: &[Light], camera: &Camera) -> Self {
+        // The edge of a cone may be anywhere in the picture, not only near its lamp.
         if lights.iter().any(|light| matches!(light.emitter, Emitter::Spot { .. })) {
             return Self::new(integrator, tiles, lights);
         }
@@ -306,6 +307,7 @@ impl InScatterIntegrator<'_> {
         for (light, images) in &visible {
             halos.extend(images.iter().filter_map(|pixel| halo(&integrator, light, *pixel, view)));
         }
+        // Lamps with a halo stay part of the coarse grid: a halo is a correction, which fades out, so that no seam is seen.
         lights.extend(visible.iter().map(|(light, _)| *light));
         let in_scattering =
             (!lights.is_empty()).then(|| InScattering::over_picture(&integrator, tiles, &lights, &view.camera));

@@ -65,6 +65,7 @@ impl OpticalDepthTable {
         }
         let mut columns = [ZERO_LANES; 4];
         for i in 0..LANES {
+            // One load of four neighboring numbers for each lane, instead of four gathers; the arithmetic after it is vectorized.
             let interval = self.intervals[positions.index[i] as usize];
             for c in 0..4 {
                 columns[c][i] = interval[c];
@@ -123,6 +124,7 @@ impl MediumBounds<'_> {
         let is_beneath = self.height < 0.0;
         let [mut nears, mut fars] = [ZERO_LANES; 2];
         for i in 0..LANES {
+            // Level lines of sight divide by 0: infinity, or NaN at height 0, which the comparison below makes infinite.
             let ground = self.height / -directions.components[1][i];
             let ground = if ground > 0.0 { ground } else { f32::INFINITY };
             let near = slice_near * lengths[i];

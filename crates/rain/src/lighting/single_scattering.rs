@@ -199,6 +199,7 @@ impl<'a> SingleScattering<'a> {
     #[inline(always)]
     fn draw_without_plate(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
         let side = self.tiles().side;
+        // Whole tiles, whatever part of them the strip shows: the corners, and so the pixels, do not depend on the crop.
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
         let edges = [tile.start, tile.end].map(|y| self.corners(y, columns.clone(), slice));
         for y in rows.y..rows.bottom() {

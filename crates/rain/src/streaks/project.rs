@@ -123,6 +123,7 @@ impl DropSelection<'_> {
         let eye = shutter_state.cameras.middle().position;
         paths.clip_at_ground((shutter_state.ground - eye.y) as f32);
         let mut streaks = paths.streaks(&shutter_state.cameras);
+        // After the projection, since few drops are in the picture and the test of each is a search through solids.
         if shutter_state.has_occluders() {
             for i in 0..LANES {
                 let [position, velocity] = [&drops.positions, &drops.velocities].map(|vectors| vector(vectors, i));
@@ -233,6 +234,7 @@ impl StreakProjection<'_> {
     ) {
         let mut lit = ZERO_LANES;
         for i in 0..LANES {
+            // As weights of 0 and 1: the light of all sixteen drops is computed without a branch.
             lit[i] = if streaks.peak[i] >= min_peak { 1.0 } else { 0.0 };
         }
         let mut radiance = [[0.0; 3]; LANES];
@@ -269,6 +271,7 @@ impl StreakProjection<'_> {
         builder: &mut StreakChunkBuilder,
     ) {
         let exposure = self.shutter_state.cameras.exposure_time / drop.count as f64;
+        // The position identifies a drop: its phases are then the same for all pieces of its path.
         let words = drop.position.map(f32::to_bits);
         let id = u64::from(words[0]) << 32 | u64::from(words[1]);
         let phases = self.shutter_state.key.uniforms(id, words[2], OSCILLATION);
@@ -307,8 +310,10 @@ pub(crate) fn map_cell_chunks<T: Send>(
         |class| unique_cells(shutter_state, class, within, half_width).into_iter().map(move |cell| (cell, class));
     let lists: Vec<Vec<_>> = classes.map(|class| of_class(class).collect()).collect();
     let mut cells = lists.concat();
+    // A stable sort of lists in the order of the classes: equal distances keep one order with any number of threads.
     cells.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance));
     let [min, max] = CELLS_PER_CHUNK;
+    // The number of chunks depends on the number of cells only, so that the order of compositing is the same on all machines.
     cells.par_chunks((cells.len() / CHUNK_COUNT).clamp(min, max)).map(&map).collect()
 }
 

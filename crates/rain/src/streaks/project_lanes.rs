@@ -34,6 +34,7 @@ impl DropPaths {
     pub(crate) fn clip_at_ground(&mut self, ground: f32) {
         for i in 0..LANES {
             let (fall, over) = (self.from[1][i] - self.to[1][i], self.from[1][i] - ground);
+            // The quotient is meaningless for a drop that does not fall; the selection below discards it without a branch.
             let falling = (over / fall).simd_min(1.0);
             let fraction = (if fall > 0.0 { falling } else { over.signum() }).simd_max(0.0);
             for axis in 0..3 {

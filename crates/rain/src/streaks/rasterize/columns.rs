@@ -39,6 +39,7 @@ impl StreakSegment {
         let touched_columns = self.touched_columns(left, top);
         // The streak does not extend to the left of its first column, unless the tile begins there.
         let clip_left = if touched_columns.start > 0 { None } else { Some(left) };
+        // Four loops, each compiled by itself: the branch is taken once for a streak, not once for each column.
         match (self.is_wide(), self.steep) {
             (false, true) => {
                 self.composite_columns(touched_columns, left, SteepStreak::new(self, clip_left, top), buffer, measure);
@@ -155,6 +156,8 @@ impl ColumnCoverage for SteepStreak {
     fn next_column(&mut self, x: f32) -> TileRows {
         let mut opacities = [0.0; TILE_ROWS];
         for row in 0..TILE_ROWS {
+            // The right edge of a pixel is the left edge of the next, so that each value of the distribution is computed once, and the pixels of a
+            // row together have the whole coverage.
             let after = disc_cdf((x + 1.0 - self.center[row]) * self.scale);
             opacities[row] = clamp_opacity(self.coverage[row] * (after - self.cdf_left[row]));
             self.cdf_left[row] = after;
@@ -173,6 +176,7 @@ impl ColumnCoverage for ShallowStreak<'_> {
     #[inline(always)]
     fn next_column(&mut self, x: f32) -> TileRows {
         let (coverage, center) = self.segment.line_crossing(x, x + 1.0);
+        // A shallow streak advances along columns: in each it is a vertical profile about the middle of its axis there.
         let (above, scale) = (self.top - center, 1.0 / self.segment.half_width);
         let mut opacities = [0.0; TILE_ROWS];
         for row in 0..TILE_ROWS {

@@ -134,6 +134,7 @@ impl TileBuffer {
         }
         for row in 0..TILE_ROWS {
             pixels[TRANSMITTANCE][row] -= blocked[row];
+            // A streak touches few of the eight pixels; those without opacity keep their depth.
             let depth = if opacities[row] > 0.0 { shading.depth } else { f32::INFINITY };
             pixels[DEPTH][row] = if depth < pixels[DEPTH][row] { depth } else { pixels[DEPTH][row] };
         }
