@@ -24,9 +24,12 @@ pub(crate) fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, dist
         if misses_bounds(caster, point, toward, distance, size) {
             continue;
         }
+        // Not from the point itself: a solid that stands on the ground would shadow all that it touches.
         let mut travel = 5e-3;
         for _ in 0..MAX_STEPS {
             let near = caster.signed_distance(point + toward * travel);
+            // Seen from the point, the light is a disc with a radius of travel * size here, and the nearest surface cuts it at `near` from its
+            // center.
             visible = visible.min(0.5 + 0.5 * near / (travel * size));
             if near < CLOSE {
                 return 0.0;
@@ -37,6 +40,7 @@ pub(crate) fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, dist
             }
         }
     }
+    // Close to the area of a disc on one side of a straight edge.
     math::smoothstep(0.0, 1.0, visible)
 }
 

@@ -101,6 +101,7 @@ impl EnergyFlux {
         let tasks = chunks(particles).into_par_iter().with_max_len(1);
         let weighted: Vec<WeightedChunk> =
             tasks.map(|chunk| self.weight_chunk(chunk, refined, &fine, rays, time)).collect();
+        // Chunks of a fixed size, summed in order: the totals have the same bits with any number of threads.
         let counts = weighted.iter().fold(NodeValues::new(&fine), |sum, chunk| sum.plus(&chunk.counts));
         let lengths = NodeValues::of_lengths(&fine, &lengths).distributed_by(&counts, MAX_CONCENTRATION);
         let tasks = chunks(particles).into_par_iter().with_max_len(1).zip(&weighted);
@@ -157,6 +158,7 @@ impl EnergyFlux {
                 inputs.side[lane] = (projection.side * side_scale) as f32;
                 projections[lane] = Some(projection);
             }
+            // Projections are scalar, since each particle has its own list of segments; the pattern, which is noise, is computed for sixteen.
             let pattern = self.rays.at(level, &inputs, time);
             for (lane, projection) in projections.into_iter().enumerate().take(count) {
                 let index = first + lane;

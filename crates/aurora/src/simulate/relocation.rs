@@ -236,6 +236,7 @@ impl Relocation {
             let Some(interval) = intervals.index(particles.sheets[index], particles.arc_fractions[index]) else {
                 continue;
             };
+            // Each particle has its own random number, keyed by its id: which ones go does not depend on how they are sorted.
             let probability = probabilities[interval];
             *dying =
                 probability > 0.0 && self.key.uniforms(particles.ids[index], update_index, THINNING)[0] < probability;

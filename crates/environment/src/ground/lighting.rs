@@ -156,6 +156,8 @@ impl Shadows<'_> {
         let toward = [0, 1, 2].map(|axis| array(arriving.toward[axis]));
         let strength = luminance(light.intensity);
         std::array::from_fn(|lane| {
+            // Lane by lane: rays take different numbers of steps, and distances to solids are lookups in double precision. So first what needs no
+            // ray.
             if toward[1][lane] <= 0.0 || factors[lane] * strength <= NEGLIGIBLE * whole[lane] {
                 return 1.0;
             }

@@ -123,6 +123,7 @@ impl PreparedSky<'_> {
     #[inline(always)]
     pub(super) fn add_stars(&self, row: &mut SkyRow, y: usize, pixels: Range<usize>) {
         let star_images = self.cache.as_ref().map_or(&[][..], |cache| &cache.star_images);
+        // Images are sorted by row, and none extends farther than 12 rows from its center.
         let from = star_images.partition_point(|image| image.pixel.y < y as f64 - 12.0);
         for image in &star_images[from..] {
             if image.pixel.y >= y as f64 + 12.0 {
@@ -266,6 +267,7 @@ pub(super) fn hill_coverage(camera: &Camera, skyline: &Skyline, x: usize, y: usi
     if above {
         return coverage;
     }
+    // Most batches are wholly above or below the skyline: azimuths, which take an arctangent, are needed only near it.
     if !below {
         for i in 0..LANES {
             turns[i] = approximations::atan2(xs[i], -zs[i]) * (1.0 / TAU) as f32;

@@ -139,6 +139,7 @@ impl<'a> Pose<'a> {
         let square = ray.direction.length_squared();
         for (index, placed) in self.solids.iter().enumerate() {
             let offset = placed.center - ray.origin;
+            // The bounding sphere first: it needs no change of frame.
             let closest = offset - ray.direction * (offset.dot(ray.direction) / square);
             if closest.length_squared() > placed.radius * placed.radius {
                 continue;
@@ -254,6 +255,7 @@ impl<'a> PlacedSolid<'a> {
         let back = self.placement.rotation.inverse();
         let local = Ray {
             origin: self.placement.point_in_local(ray.origin),
+            // Scaled like the solid, so that distances along the ray are the same in both frames.
             direction: back * ray.direction / self.placement.scale,
         };
         let parameters = self.solid.obstacle.parameters();

@@ -327,6 +327,8 @@ impl GustField {
         let nodes: Vec<Option<GustState>> = (0..grid.count.iter().product::<usize>())
             .into_par_iter()
             .map(|index| {
+                // The sphere fills half of the grid. The history of a node, a sample of the wind for each step of the memory of the gusts, is by far
+                // the dearest part.
                 grid.acts_within(index, center, radius + displacement)
                     .then(|| limited(grid.gusts(index, &samples), MAX_DISPLACEMENT_RATIO * spacing))
             })

@@ -56,6 +56,7 @@ impl<'t> Lines<'t> {
     pub(crate) fn position(&mut self, byte: usize) -> LineColumn {
         let byte = floor_char_boundary(self.text, byte);
         if byte < self.byte {
+            // From the beginning: problems come in the order of the text, so that this is rare.
             *self = Self::new(self.text);
         }
         let passed = &self.text[self.byte..byte];

@@ -117,6 +117,7 @@ impl SourceBuilder<'_> {
                 self.field.foot_point(east, south),
                 powers,
                 node_coordinate(cell.energy_ev),
+                // The complement: cells and particles both count from 0, and would have the same tracks.
                 self.random_key(!cell.cell_index),
             );
         }
@@ -234,6 +235,7 @@ impl Sources {
             let builder = SourceBuilder { weight, instant, ..builder };
             sharp.extend(builder.particles(inputs.particles, lasting, *offset_s as f32));
         }
+        // Red light is spread over kilometers, so that a coarser chart holds all of it.
         let soft = SourceBuilder { reach: red_spread as f32 * REACH, ..builder }.cells(&red, RED);
         Self { sharp, soft, spread_km: [spread, red_spread] }
     }

@@ -90,6 +90,7 @@ impl EmissionProfiles {
 
     #[inline(never)]
     fn table(&self, table_index: usize) -> &MipTables {
+        // A function of its own: inlined, the construction would be compiled into every kernel that only looks a table up.
         self.tables[table_index].get_or_init(|| {
             let mut profile = self.emission.profile(table_energy_ev(table_index));
             for (light, attenuation) in profile.iter_mut().zip(&self.attenuation) {

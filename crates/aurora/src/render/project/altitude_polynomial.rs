@@ -65,6 +65,7 @@ impl<'a> ProjectedFieldLine<'a> {
         for i in 0..COUNT {
             let (altitude, distance) = (altitudes[i], distances[i]);
             let squared = altitude.fma(DIAMETER + altitude, -distance.fma(2.0 * outward + distance, constant));
+            // The discriminant of the quadratic that gives the coordinate along the field at this altitude.
             let squared = along.fma(along, squared);
             let squared = if squared > 1.0 { squared } else { 1.0 };
             per_upward[i] = squared.simd_rsqrt();
@@ -179,6 +180,7 @@ impl RowPolynomials {
     #[inline(always)]
     pub(crate) fn points<S: Simd>(&self, coordinates: Lanes<S>, offsets: Lanes<S>) -> [Lanes<S>; 2] {
         let slopes = polynomial(coordinates, &self.slopes[..TERMS]);
+        // A source is narrow: across it the row is linear in the distance.
         let rows = slopes.fma(offsets, polynomial(coordinates, &self.rows));
         [rows, polynomial(coordinates, &self.brightness[..TERMS])]
     }

@@ -74,6 +74,7 @@ impl BlurKernel {
         for (distance, weights) in self.0.iter().enumerate().skip(1) {
             let before = FourLanes::simd_from(simd, light[middle - distance * stride]);
             let after = FourLanes::simd_from(simd, light[middle + distance * stride]);
+            // Both sides share a weight, so they are added first.
             sum = (before + after).fma(FourLanes::simd_from(simd, *weights), sum);
         }
         sum.into()
@@ -101,6 +102,7 @@ impl BlurredImage {
         light.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
             dispatch!(level, simd => {
                 for (x, light) in row.iter_mut().enumerate().take(width - margin).skip(margin) {
+                    // Down the picture the terms of a sum are a row apart, but successive pixels read successive memory in each of these rows.
                     *light = kernel.sum(simd, &rows, (y + margin) * width + x, width);
                 }
             });

@@ -86,6 +86,7 @@ impl NearestSegmentGrid {
     pub(crate) fn nearest_point(&self, point: DVec2) -> Option<NearestPoint> {
         let cell = self.grid.cell_of(point);
         let mut nearest = NearestPoint { segment: 0, fraction: 0.0, distance_squared: f64::INFINITY, cross: 0.0 };
+        // The lists hold the segments themselves, not their indices: a query reads one run of memory.
         for segment in &self.lists[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
             let from_start = point - segment.start;
             let fraction = (from_start.dot(segment.direction) * segment.inverse_square).clamp(0.0, 1.0);

@@ -172,6 +172,7 @@ impl RefinedShape {
         let mut after = 1;
         for node in 0..=last {
             let fraction = node as f64 / last as f64;
+            // Both ascend, so the search goes on from the node before.
             while after + 1 < fractions.len() && fractions[after] <= fraction {
                 after += 1;
             }
