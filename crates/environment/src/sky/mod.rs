@@ -1,7 +1,7 @@
 //! The sky as a background, where there is no plate or one with alpha: by day, at twilight or at night, with a skyline of hills and
 //! trees.
 //!
-//! The radiance model itself is [`Sky`](bansho_base::world::sky::Sky), since it also lights other things; this module draws it. By night it adds
+//! The radiance model itself is [`Sky`], since it also lights other things; this module draws it. By night it adds
 //! stars and the Milky Way.
 //!
 //! # References
