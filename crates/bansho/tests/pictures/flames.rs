@@ -57,7 +57,7 @@ fn a_campfire_flickers_as_fires_do() {
 fn flames_narrow_upward_and_never_touch_the_edges_of_their_sheet() {
     let frames: Vec<i64> = (0..12).map(|i| 10 * i).collect();
     let text = "bansho = 2\n[picture]\nsize = [144, 144]\n[camera]\nposition = [0, 0.85, 4]\ntarget = [0, 0.85, 0]\n\
-                [[flame_sheet]]\nwind_response = 0\n";
+                [[flame_sheet]]\nwidth = 1.1\nheight = 1.7\nwind_response = 0\nshape = { eddies = 0 }\n";
     let film = Film::of_text(text, [144, 144], &frames, &SceneOptions::default());
     let lit_at = |share: f64| -> f64 {
         // The sheet, 1.7 m high, fills 84 of 144 rows around the middle of the picture.

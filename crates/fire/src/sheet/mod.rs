@@ -37,6 +37,7 @@
 //! 2. `tables::shape_tables::ShapeTables` tabulates the user's curves, and `tables::color_ramp::ColorRamp` sharpening and color, on first use.
 //! 3. For each time sample of the exposure, `animate::clock` gives time and scroll, `animate::fluctuation` the sums of sines, and
 //!    `animate::warp` the warp of the coordinates, including wind.
+//!    `eddies` displaces coordinates to where the gas has come from.
 //! 4. `texture` gives T0 at that scroll: layers of noise (`fractal`), or the paper's sum (`paper`), filtered for the sheet's size in pixels.
 //! 5. `render::time_samples` gives the sheet's quad and state at each of them. `render::projection` maps pixels to sheet coordinates for any
 //!    lens; `tables::shape_tables` maps those to flame coordinates.
@@ -47,6 +48,7 @@
 //! 9. `render::prepared` sorts flames, smoke and [sparks](crate::sparks) by depth; `render::emitted_light` gives point lights for other objects.
 
 pub(crate) mod animate;
+pub(crate) mod eddies;
 pub mod equations;
 mod model;
 mod parameters;

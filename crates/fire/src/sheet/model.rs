@@ -14,6 +14,7 @@ use super::{
         clock::Clock,
         warp::{FlameWaves, WarpState, WindLean},
     },
+    eddies::Eddies,
     parameters::{ColorParameters, Facing, FlameSheetParameters, InstanceParameters, SheetMethod, TextureKind},
     soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
@@ -86,7 +87,7 @@ impl FlameSheet {
         let has_soot_field = self.parameters.method == SheetMethod::SootField;
         let tables: &Arc<Tables> = get_or_compute(&self.tables, || {
             Arc::new(Tables {
-                shape: Box::new(ShapeTables::new(shape, texture, color)),
+                shape: Box::new(ShapeTables::new(shape, texture, color, |y| self.eddy_reach(y))),
                 ramp: Box::new(ColorRamp::new(texture, color, *stage)),
                 soot_field: has_soot_field.then(|| Box::new(SootFieldTables::new(&self.parameters.soot_field, color))),
             })
@@ -99,12 +100,20 @@ impl FlameSheet {
         let (own, other) = (&self.parameters, &previous.parameters);
         let is_same_color =
             ColorParameters { luminance: own.color.luminance.clone(), ..other.color.clone() } == own.color;
+        // The proportions of the sheet determine how far its eddies reach.
         if (&own.shape, &own.texture, own.stage) == (&other.shape, &other.texture, other.stage)
+            && (own.width, own.height) == (other.width, other.height)
             && (own.method, &own.soot_field) == (other.method, &other.soot_field)
             && is_same_color
         {
             self.tables.clone_from(&previous.tables);
         }
+    }
+
+    /// Largest displacement by the eddies at height `y`, which is the same for all flames, in sheet widths and heights.
+    fn eddy_reach(&self, y: f32) -> [f32; 2] {
+        let eddies = self.flames.first().and_then(|flame| flame.eddies.as_ref());
+        eddies.map_or([0.0; 2], |eddies| eddies.reach(y))
     }
 
     /// The mapping to flame coordinates and the threshold: tables that do not change with time.
@@ -139,6 +148,16 @@ pub(crate) struct FlameInstance {
     pub(crate) key: Key,
     pub(crate) waves: FlameWaves,
     pub(crate) texture_source: TextureSource,
+    pub(crate) eddies: Option<Eddies>,
+}
+
+impl FlameInstance {
+    /// Texels per sheet height of its texture. Eddies squeeze those of a texture, and theirs may be finer.
+    pub(crate) fn texels_up(&self) -> f64 {
+        const SQUEEZED: f64 = 1.5;
+        let texels_up = self.texture_source.texels_up();
+        self.eddies.as_ref().map_or(texels_up, |eddies| SQUEEZED * texels_up.max(eddies.texels_up()))
+    }
 }
 
 impl FlameSheet {
@@ -223,10 +242,13 @@ fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Cloc
         let texture_source = match (&paper, exact) {
             (Some(layer), _) => TextureSource::Paper(layer.clone()),
             (_, Some(sum)) => TextureSource::Exact(sum),
-            _ => TextureSource::Fractal(FractalLayers::new(tongue_size(parameters), 1.0, key, clock)),
+            _ => TextureSource::Fractal(
+                FractalLayers::new(tongue_size(parameters), 1.0, key, clock).overlapping(texture.overlap),
+            ),
         };
         let waves = FlameWaves::new(&parameters.shape, key, clock);
-        flames.push(FlameInstance { placement, key, waves, texture_source });
+        let eddies = Eddies::new(parameters, key, clock);
+        flames.push(FlameInstance { placement, key, waves, texture_source, eddies });
     }
     flames
 }

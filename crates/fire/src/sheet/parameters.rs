@@ -81,14 +81,27 @@ bansho_base::parameters! {
         /// h, eq. (11): speed at the edge, where it is lowest, as a fraction of the speed on the axis.
         edge_speed: f64 = 0.55, limits(Range::new(0.02, 1.0));
         /// A(w), eq. (11): half width of the core, which rises at uniform speed, as a function of height; 1 is the edge of the sheet.
-        core_width: Curve = curve(&[[0.0, 0.26], [0.1, 0.44], [0.22, 0.54], [0.5, 0.38], [1.0, 0.12]]),
+        core_width: Curve = curve(&[[0.0, 0.6], [0.3, 0.5], [0.6, 0.35], [1.0, 0.15]]),
             limits(CurveLimits::unit_to(0.01, 1.0));
         /// D(w), eq. (11): width of the fringe, which flutters, as a function of height; it starts at (0, 0). A + D must not exceed 1.
-        fringe_width: Curve = curve(&[[0.0, 0.0], [0.3, 0.22], [0.6, 0.42], [1.0, 0.4]]), limits(CurveLimits::default());
+        fringe_width: Curve = curve(&[[0.0, 0.0], [0.1, 0.25], [0.4, 0.35], [1.0, 0.4]]), limits(CurveLimits::default());
         /// 1 - F, eq. (11): decrease of speed across the fringe, from 0 at its inner edge to 1 at its outer edge.
         slowing: Curve = curve(&[[0.0, 0.0], [0.5, 0.4], [1.0, 1.0]]), limits(CurveLimits::default().rising());
         /// Strength of P, eq. (15): how far the edge moves into the fringe. At 0 it stays at the outer edge.
-        flutter: f64 = 0.6, limits(FRACTION);
+        flutter: f64 = 0.3, limits(FRACTION);
+        /// B(x), height of what burns as a function of x, in sheet heights. It hides the flame below; it is itself not drawn.
+        fuel_outline: Curve = curve(&[[0.0, 0.0], [1.0, 0.0]]), limits(CurveLimits::default());
+        /// How much the columns of the texture follow the outline: at 1 they are squeezed and spread with it, eq. (16), and meet where it closes; at 0 they
+        /// are parallel, and the outline cuts through them.
+        convergence: f64 = 0.3, limits(FRACTION);
+        /// Strength of the eddies that roll along the edges and carry the gas sideways; at 0 there are none, at 1 they turn by about a third of a turn.
+        eddies: f64 = 0.55, limits(Range::new(0.0, 2.0));
+        /// Distance from one eddy to the next along an edge, in sheet widths. With the speed of the eddies it gives the frequency at which the flame puffs.
+        eddy_size: f64 = 0.45, limits(Range::new(0.05, 10.0));
+        /// Speed at which the eddies rise, relative to that of the gas.
+        eddy_speed: f64 = 0.4, limits(Range::new(0.01, 2.0));
+        /// Height at which the eddies have grown to their full strength, in sheet heights.
+        eddy_height: f64 = 0.4, limits(Range::new(0.01, 2.0));
         /// Waves of the edge per sheet height.
         flutter_waves: f64 = 1.1, limits(Range::new(0.1, 20.0)), unit("1/height");
         /// Sideways amplitude of the tip, in sheet widths.
@@ -107,6 +120,9 @@ bansho_base::parameters! {
     pub struct TextureParameters {
         /// Kind of texture.
         kind: TextureKind = TextureKind::Fractal;
+        /// Whether the two layers of the fractal texture are flames one behind the other, each with its own threshold and tongues, whose soot adds; else they
+        /// are mixed into one.
+        overlap: bool = true;
         /// Number of octaves of the paper's texture. The paper does not state it.
         octaves: i64 = 5, limits(Range::new(1.0, 6.0));
         /// Width of the tongues of the fractal texture; at 1 there are about three across the flame.
@@ -115,13 +131,16 @@ bansho_base::parameters! {
         tongue_length: f64 = 1.0, limits(Range::new(0.1, 10.0));
         /// Contrast of the texture. At 0 the gas is uniform, as in the flame of a candle in still air; 1 leaves the texture unchanged.
         contrast: f64 = 1.0, limits(FRACTION);
+        /// How much the soot thins where the threshold L is high, toward the tips and the sides: T1 is multiplied by 1 - thinning L, so that edges are soft
+        /// there. At 0 all edges are alike.
+        thinning: f64 = 0.6, limits(FRACTION);
         /// V(w), eq. (4): threshold as a function of height.
-        threshold: Curve = curve(&[[0.0, 0.0], [0.25, 0.08], [0.6, 0.42], [0.85, 0.75], [1.0, 1.0]]),
-            limits(CurveLimits::default().rising());
+        threshold: Curve = curve(&[[0.0, 1.0], [0.05, 0.6], [0.15, 0.25], [0.3, 0.25], [0.6, 0.55], [0.85, 0.85], [1.0, 1.0]]),
+            limits(CurveLimits::default());
         /// H(u), eq. (4): threshold as a function of the distance from the axis, from 0 on the axis to 1 at both edges.
         threshold_across: Curve = curve(&[[0.0, 0.0], [0.5, 0.1], [0.82, 0.45], [1.0, 1.0]]), limits(CurveLimits::default().rising());
         /// C(s), eq. (6): sharpening. It starts at (0, 0). A maximum below s = 1 keeps the core from being uniform.
-        sharpen: Curve = curve(&[[0.0, 0.0], [0.06, 0.22], [0.16, 0.48], [0.4, 0.82], [0.7, 1.0], [1.0, 0.86]]),
+        sharpen: Curve = curve(&[[0.0, 0.0], [0.02, 0.18], [0.07, 0.44], [0.16, 0.68], [0.36, 0.97], [0.6, 1.0], [1.0, 0.93]]),
             limits(CurveLimits::default());
     }
     paper: kind, octaves;
@@ -149,7 +168,7 @@ bansho_base::parameters! {
         /// Optical depth of the soot where T2 is 1. It determines how much light from behind the flame absorbs.
         soot_optical_depth: f64 = 0.35, limits(Range::new(0.0, 20.0));
         /// Factor of brightness and soot as a function of height w; low in the dark zone at the base.
-        glow: Curve = curve(&[[0.0, 0.0], [0.1, 0.12], [0.3, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
+        glow: Curve = curve(&[[0.0, 0.0], [0.08, 0.25], [0.2, 0.85], [0.35, 1.0], [1.0, 1.0]]), limits(CurveLimits::default());
         /// Luminance of the blue light at the base, as a fraction of `luminance`.
         base_blue: f64 = 0.0, limits(FRACTION);
     }
@@ -245,9 +264,9 @@ bansho_base::parameters! {
         /// Position of the center of its base.
         position: Animated<[f64; 3]> = Animated::from([0.0, 0.0, 0.0]), unit("m");
         /// Width of the sheet.
-        width: f64 = 1.1, limits(Range::new(0.001, 1000.0)), unit("m");
+        width: f64 = 1.4, limits(Range::new(0.001, 1000.0)), unit("m");
         /// Height of the sheet.
-        height: f64 = 1.7, limits(Range::new(0.001, 1000.0)), unit("m");
+        height: f64 = 1.6, limits(Range::new(0.001, 1000.0)), unit("m");
         /// Direction that the sheet faces.
         facing: Facing = Facing::Camera;
         /// Rotation about the vertical for `facing = "fixed"`; at 0 it faces +z.

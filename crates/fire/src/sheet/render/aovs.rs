@@ -131,12 +131,29 @@ impl FlameSheet {
         let rise = self.gas_speed(flame, x, y, now) * (next - now);
         let shift = self.base_displacement(now, next);
         let bend = warp.center(y + rise) - warp.center(y);
+        // Where the gas is seen is as far from where it would be without eddies as they displace it, in the opposite direction.
+        let [before, after] = [
+            self.eddy_displacement(flame, warp, [x, y], now),
+            self.eddy_displacement(flame, warp, [x + bend, y + rise], next),
+        ];
+        let (bend, rise) = (bend - (after[0] - before[0]), rise - (after[1] - before[1]));
         let before = view.camera.project_beyond_circle(quad.point(x, y));
         let camera = view.camera_at(next);
         let after = camera.project_beyond_circle(quad.point(x + bend, y + rise) + shift);
         match (before, after) {
             (Some(before), Some(after)) => {
                 (camera.nearest_repetition(after.pixel, before.pixel) - before.pixel).as_vec2().to_array()
+            }
+            _ => [0.0; 2],
+        }
+    }
+
+    /// Displacement by the eddies at (x, y) of the sheet; 0 without them, and for a soot field, which has its own.
+    fn eddy_displacement(&self, flame: &FlameInstance, warp: &WarpState, point: [f64; 2], t: f64) -> [f64; 2] {
+        match &flame.eddies {
+            Some(eddies) if self.parameters.method == SheetMethod::FlameTexture => {
+                let state = eddies.after(self.clock.scroll(self.flame_time(flame, t)));
+                state.displacement(warp.unwarp_at(point.map(|value| value as f32))).map(f64::from)
             }
             _ => [0.0; 2],
         }

@@ -41,16 +41,22 @@ pub(crate) struct DrawContext<'a> {
 /// Texels between neighboring pixels up to which one lookup per pixel causes no visible aliasing.
 pub(crate) const MAX_MINIFICATION: f32 = 4.0;
 
+/// The same with eddies, which fold the texture along lines: there the eye sees less aliasing, and pixels cost most.
+pub(crate) const MAX_EDDY_MINIFICATION: f32 = 8.0;
+/// Largest distance between exact rows with eddies.
+pub(crate) const MAX_EDDY_BAND: usize = 4;
+
 /// Supersampling offsets from the pixel center, pixels across and up: rotated grid, no two in one column or row.
 const SUPERSAMPLES_4: [[f32; 2]; 4] = [[-0.375, 0.125], [-0.125, -0.375], [0.125, 0.375], [0.375, -0.125]];
 /// Offsets for up to twice the maximum minification.
 const SUPERSAMPLES_2: [[f32; 2]; 2] = [[-0.25, 0.25], [0.25, -0.25]];
 
-/// Distance between exact rows for a sheet of that height: 1 up to 255 pixels, 16 from 1024 on.
-pub(crate) fn row_band_height(height_pixels: f64) -> usize {
+/// Distance between exact rows for a sheet of that height: 1 up to 255 pixels, 16 from 1024 on, 4 with eddies.
+pub(crate) fn row_band_height(height_pixels: f64, has_eddies: bool) -> usize {
     /// Distances between exact rows, and the minimum sheet heights for which they are used.
     const BANDS: [(usize, f64); 3] = [(16, 1024.0), (4, 512.0), (2, 256.0)];
-    BANDS.into_iter().find(|(_, min_height)| height_pixels >= *min_height).map_or(1, |(rows, _)| rows)
+    let rows = BANDS.into_iter().find(|(_, min_height)| height_pixels >= *min_height).map_or(1, |(rows, _)| rows);
+    if has_eddies { rows.min(MAX_EDDY_BAND) } else { rows }
 }
 
 /// Pixels of a row that are tested together for being outside the flame.

@@ -41,7 +41,8 @@ impl FlameSheet {
             return self.soot_row_intensities(flame, warp, t);
         }
         let texture = flame.texture_source.texture(warp.scroll);
-        let state = SheetState { warp, texture, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
+        let eddies = flame.eddies.as_ref().map(|eddies| eddies.after(warp.scroll));
+        let state = SheetState { warp, texture, eddies, pixel: [2.0 / LANES as f32, 1.0 / ROWS as f32] };
         let size = self.sheet_size(flame);
         let cell_area = size.x * size.y / (LANES * ROWS) as f64;
         let scale = (cell_area * self.luminance_at(t)) as f32;

@@ -20,7 +20,7 @@ use fearless_simd::Level;
 use super::{
     aovs::{AovContext, write_aov_rows},
     cells::{CellResolution, SheetCells, small_height},
-    draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
+    draw::{DrawContext, MAX_EDDY_MINIFICATION, MAX_MINIFICATION, draw_rows, row_band_height},
     draw_cells::{CellContext, CellSample, CellSums, TextureCells, draw_cells},
     shade::{SheetContent, TimeSample},
     soot_field::{SootContext, SootSample, draw_soot_rows},
@@ -104,7 +104,7 @@ impl FlameSheet {
         match self.parameters.method {
             _ if self.is_out(t) => {}
             SheetMethod::FlameTexture => {
-                let texels_up = flame.texture_source.texels_up();
+                let texels_up = flame.texels_up();
                 let is_flame = self.content() == SheetContent::Flame;
                 let top = if is_flame { self.height_fraction(t).min(1.0) } else { 1.0 };
                 let grid = SheetCells::new(&view.camera, &quad, &CellResolution { texels_up, top });
@@ -234,7 +234,9 @@ impl PreparedSheet<'_> {
             let samples: Vec<TextureCells> = samples.iter().map(|sample| TextureCells(sample, content)).collect();
             return self.draw_cells(command, &samples, absorbs, rect, strip);
         }
-        let row_band = samples.first().map_or(1, |sample| row_band_height(1.0 / f64::from(sample.state.pixel[1])));
+        let row_band = samples
+            .first()
+            .map_or(1, |sample| row_band_height(1.0 / f64::from(sample.state.pixel[1]), sample.state.eddies.is_some()));
         let context = DrawContext {
             shape: sheet.shape(),
             ramp: sheet.ramp(),
@@ -242,7 +244,7 @@ impl PreparedSheet<'_> {
             content,
             absorbs,
             row_band,
-            max_minification: MAX_MINIFICATION,
+            max_minification: if command.flame.eddies.is_some() { MAX_EDDY_MINIFICATION } else { MAX_MINIFICATION },
         };
         fearless_simd::dispatch!(self.level, simd => draw_rows(simd, &context, rect, strip));
         if !strip.aovs.is_empty() {

@@ -71,7 +71,7 @@ impl FlameSheet {
         let source = FilteredTexture::fractal(layers, filter_height, &self.filter_cache);
         let pixel = [2.0 / (scale * plume.x) as f32, 1.0 / (scale * plume.y) as f32];
         let pixel = grid.filter(|_| cells.is_some()).map_or(pixel, |grid| grid.cell());
-        let state = SheetState { texture: source.texture(warp.scroll), pixel, warp };
+        let state = SheetState { texture: source.texture(warp.scroll), eddies: None, pixel, warp };
         let smoke_state = SmokeState {
             optical_depth: (smoke.optical_depth * self.flow_at(t)) as f32,
             base_width: (0.8 / smoke.width).min(1.0) as f32,

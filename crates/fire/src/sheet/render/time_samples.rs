@@ -22,7 +22,7 @@ use crate::sheet::{
 };
 
 /// Motion of the gas between time samples, pixels, and the maximum number of time samples.
-const PIXELS_PER_SAMPLE: f64 = 8.0;
+const PIXELS_PER_SAMPLE: f64 = 10.0;
 const MAX_SAMPLES: f64 = 8.0;
 /// Largest motion of the gas that the time samples resolve, pixels.
 const MAX_SCROLL: f64 = PIXELS_PER_SAMPLE * MAX_SAMPLES;
@@ -93,7 +93,9 @@ impl FlameSheet {
             let (quad, warp) = self.evaluate_at(flame, right, wind, t);
             let Some(pixel_to_sheet) = PixelToSheet::new(&camera, &quad) else { continue };
             let [low, high] = warp.center_range;
-            let sides = [low.min(0.0), 1.0 + high.max(0.0)];
+            let eddies = flame.eddies.as_ref().map(|eddies| eddies.after(warp.scroll));
+            let reach = flame.eddies.as_ref().map_or(0.0, |eddies| f64::from(eddies.reach(0.5)[0]));
+            let sides = [low.min(0.0) - reach, 1.0 + high.max(0.0) + reach];
             let cells = grid.and_then(|grid| ProjectedCells::new(&camera, &quad, sides, grid));
             if grid.is_some() && cells.is_none() {
                 // A part of it cannot be projected, as when it is beside or behind the camera.
@@ -107,7 +109,7 @@ impl FlameSheet {
             let pixels_per_meter = pixels_per_meter(&camera, &quad);
             let pixel = [2.0 / (pixels_per_meter * quad.size.x) as f32, 1.0 / (pixels_per_meter * quad.size.y) as f32];
             let pixel = grid.map_or(pixel, |grid| grid.cell());
-            let state = SheetState { texture: texture_source.texture(warp.scroll), pixel, warp };
+            let state = SheetState { texture: texture_source.texture(warp.scroll), eddies, pixel, warp };
             let luminance = self.luminance_at(t) as f32 / count as f32;
             samples.push(TimeSample { pixel_to_sheet, quad, state, luminance, smoke: None, cells });
         }

@@ -25,6 +25,12 @@ pub(crate) struct ShapeTables {
     initial_speed: f32,
     edge_speed: f32,
     contrast: f32,
+    thinning: f32,
+    convergence: f32,
+    /// 1 over the largest width A + D, at which parallel columns of the texture are as wide as those that follow the outline.
+    inverse_width: f32,
+    /// B over x; `None` if it is 0.
+    fuel_outline: Option<CurvePair>,
     /// Core width A and fringe width D over w.
     widths: CurvePair,
     /// F over the position in the fringe.
@@ -96,6 +102,22 @@ pub(crate) struct FlameCoordinates<S: Simd> {
 }
 
 impl<S: Simd> FlameCoordinates<S> {
+    /// Coordinates of points far outside the flame.
+    #[inline(always)]
+    pub(crate) fn outside(y: Lanes<S>) -> Self {
+        let (zero, one) = (y.broadcast(0.0), y.broadcast(1.0));
+        let far = y.broadcast(-1e3);
+        Self {
+            u: zero,
+            w: one,
+            threshold: one,
+            glow: zero,
+            cooling: [one; 2],
+            edge_distance_pixels: far,
+            base_distance_pixels: zero,
+        }
+    }
+
     /// Pixel coverage of the flame's outline, for antialiasing; 0 outside.
     #[inline(always)]
     pub(crate) fn coverage(&self, pixel: [f32; 2]) -> Lanes<S> {
@@ -168,7 +190,14 @@ impl ShapeTables {
     }
 
     /// Tables for curves that were [checked](Self::check).
-    pub(crate) fn new(shape: &SheetShapeParameters, texture: &TextureParameters, color: &ColorParameters) -> Self {
+    ///
+    /// `reach` gives the largest displacement by eddies across and up, of either sign, at a height.
+    pub(crate) fn new(
+        shape: &SheetShapeParameters,
+        texture: &TextureParameters,
+        color: &ColorParameters,
+        reach: impl Fn(f32) -> [f32; 2],
+    ) -> Self {
         let fringe = from_origin(&shape.fringe_width, "shape.fringe_width");
         let fringe = fringe.unwrap_or_else(|_| shape.fringe_width.clone());
         let width_samples = samples(&shape.core_width, &fringe);
@@ -176,6 +205,12 @@ impl ShapeTables {
             initial_speed: shape.initial_speed as f32,
             edge_speed: shape.edge_speed as f32,
             contrast: texture.contrast as f32,
+            thinning: texture.thinning as f32,
+            convergence: shape.convergence as f32,
+            inverse_width: 1.0
+                / width_samples.iter().fold(0.01, |widest, [core, fringe]| f32::max(widest, core + fringe)),
+            fuel_outline: (shape.fuel_outline.points().iter().any(|[_, height]| *height > 0.0))
+                .then(|| CurvePair::new(|x| [shape.fuel_outline.eval(x), 0.0])),
             widths: CurvePair::from_samples(|i| width_samples[i]),
             falloff: CurvePair::new(|position| [1.0 - shape.slowing.eval(position), 0.0]),
             threshold_across: CurvePair::new(|across| [texture.threshold_across.eval(across), 0.0]),
@@ -185,6 +220,7 @@ impl ShapeTables {
             max_distance: Box::new([1.0; EXTENT_BINS]),
         };
         result.max_distance = result.compute_max_distance();
+        result.extend_by(reach);
         result
     }
 
@@ -215,6 +251,27 @@ impl ShapeTables {
         texture.fma(texture.broadcast(self.contrast), texture.broadcast(1.0 - self.contrast))
     }
 
+    /// Factor of T1 by the parameter `thinning` where the threshold is L; 1 without it.
+    #[inline(always)]
+    pub(crate) fn soot<S: Simd>(&self, threshold: Lanes<S>) -> Lanes<S> {
+        threshold.fma(threshold.broadcast(-self.thinning), threshold.broadcast(1.0))
+    }
+
+    /// Raises the base to the height of what burns at (x, y) of the sheet.
+    #[inline(always)]
+    pub(crate) fn hide_below_fuel<S: Simd>(
+        &self,
+        coordinates: &mut FlameCoordinates<S>,
+        x: Lanes<S>,
+        y: Lanes<S>,
+        pixel: [f32; 2],
+    ) {
+        if let Some(outline) = &self.fuel_outline {
+            let [height, _] = outline.lookup(&lookup_index(x));
+            coordinates.base_distance_pixels = (y - height) * y.broadcast(1.0 / pixel[1]);
+        }
+    }
+
     /// Slowed rise, eq. (12), at one point.
     pub(crate) fn slowed_rise_at(&self, distance: f32, y: f32) -> f32 {
         let rise = equations::rise(y, self.initial_speed);
@@ -243,10 +300,16 @@ impl ShapeTables {
         let edge = x.select_lt(half, left, right);
         let edge_distance_pixels = (edge - distance) * x.broadcast(1.0 / pixel[0]);
         let across = equations::across(distance, edge).simd_min(one);
+        let column = if self.convergence < 1.0 {
+            let parallel = distance * x.broadcast(self.inverse_width);
+            (across - parallel).fma(x.broadcast(self.convergence), parallel)
+        } else {
+            across
+        };
         let [horizontal, _] = self.threshold_across.lookup(&lookup_index(across));
         let threshold = equations::threshold(vertical, horizontal);
         FlameCoordinates {
-            u: equations::texture_u(across, x),
+            u: equations::texture_u(column, x),
             w,
             threshold,
             glow,
@@ -308,6 +371,34 @@ impl ShapeTables {
         extent
     }
 
+    /// Extends the largest x' to points that eddies displace by up to `reach` into the flame.
+    fn extend_by(&mut self, reach: impl Fn(f32) -> [f32; 2]) {
+        const LAST: usize = EXTENT_BINS - 1;
+        let within = self.max_distance.clone();
+        for (bin, extent) in self.max_distance.iter_mut().enumerate() {
+            // At both ends of the bin: a reach has no maximum within a bin that is much higher.
+            let ends = [bin, bin + 1].map(|end| reach(end as f32 / LAST as f32));
+            let [across, up] = [0, 1].map(|k| ends[0][k].max(ends[1][k]));
+            if up > 0.0 || across > 0.0 {
+                let bins = (up * LAST as f32).ceil() as usize + 1;
+                let reached = &within[bin.saturating_sub(bins)..=(bin + bins).min(LAST)];
+                *extent = reached.iter().fold(0.0, |most: f32, value| most.max(*value)) + 2.0 * across;
+            }
+        }
+    }
+
+    /// Whether there is no flame at sixteen points of a row, nor up to `margin` above and below them.
+    #[inline(always)]
+    pub(crate) fn is_outside<S: Simd>(&self, x: Lanes<S>, y: Lanes<S>, margin: f32) -> bool {
+        let (first, last) = (y[0], y[LANES - 1]);
+        let (low, high) = (first.simd_min(last) - margin, last.simd_max(first) + margin);
+        let mut extent = 0.0_f32;
+        for bin in extent_bin(low)..=extent_bin(high) {
+            extent = extent.simd_max(self.max_distance[bin]);
+        }
+        high < 0.0 || low > 1.1 || !any_positive(x.broadcast(extent) - equations::axis_distance(x))
+    }
+
     /// Maximum of A + D at each sampled height and above.
     fn max_width_above(&self) -> Vec<f32> {
         let mut widest: Vec<f32> = self.width_samples.iter().map(|[core, fringe]| core + fringe).collect();
@@ -347,4 +438,85 @@ fn cooling_factors(color: &ColorParameters, w: f64) -> [f64; 2] {
     }
     let cooled_fraction = color.cooling * w;
     [math::exp(-RED * cooled_fraction), math::exp((RED - GREEN) * cooled_fraction)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tables of the default flame after changes to its shape, and its edges without flutter.
+    fn tables(change: impl FnOnce(&mut SheetShapeParameters)) -> (ShapeTables, CurvePair) {
+        let mut shape = SheetShapeParameters::default();
+        change(&mut shape);
+        let tables = ShapeTables::new(&shape, &TextureParameters::default(), &ColorParameters::default(), |_| [0.0; 2]);
+        let outer = [1.0; SEGMENTS + 1];
+        let edges = tables.edges(&outer, &outer);
+        (tables, edges)
+    }
+
+    /// u of sixteen points from x = 0.4 to 0.6 at height `y`.
+    fn columns((tables, edges): &(ShapeTables, CurvePair), y: f32) -> Vec<f32> {
+        bansho_base::dispatch_baseline!(simd => {
+            let x = Lanes::from_fn(simd, |i| 0.4 + 0.2 / 15.0 * i as f32);
+            tables.coordinates(x, x.broadcast(y), edges, [0.01, 0.01]).u.as_slice().to_vec()
+        })
+    }
+
+    #[test]
+    fn parallel_columns_do_not_meet_where_the_outline_closes() {
+        let closing = |convergence: f64| {
+            tables(|shape| {
+                shape.core_width = curve(&[[0.0, 0.01], [0.5, 0.8], [1.0, 0.01]]);
+                shape.fringe_width = curve(&[[0.0, 0.0], [1.0, 0.0]]);
+                shape.convergence = convergence;
+            })
+        };
+        // The largest width is 0.8: 0.2 sheet widths are a quarter of the texture's width at every height.
+        for y in [0.001, 0.1, 0.4, 0.9] {
+            let u = columns(&closing(0.0), y);
+            assert!((u[15] - u[0] - 0.25).abs() < 1e-3, "{y}: {u:?}");
+        }
+        // Columns that follow the outline meet: beyond it, u is clamped to that of the edge.
+        let u = columns(&closing(1.0), 0.001);
+        assert!(u[0] == 0.0 && u[15] == 1.0, "{u:?}");
+    }
+
+    #[test]
+    fn the_default_outline_is_open_at_the_base() {
+        let (_, edges) = tables(|_| {});
+        // A(0) = 0.6, by the default curve.
+        assert!((edges.at(0.0)[0] - 0.6).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_area_of_the_outline_is_that_of_the_curves() {
+        // A falls from 0.6 to 0.2 and D rises from 0 to 0.3, both linearly: the mean of A + D is 0.4 + 0.15.
+        let (_, edges) = tables(|shape| {
+            shape.core_width = curve(&[[0.0, 0.6], [1.0, 0.2]]);
+            shape.fringe_width = curve(&[[0.0, 0.0], [1.0, 0.3]]);
+        });
+        let mean = (0..1000).map(|i| f64::from(edges.at((i as f32 + 0.5) / 1000.0)[1])).sum::<f64>() / 1000.0;
+        assert!((mean - 0.55).abs() < 1e-4, "{mean}");
+    }
+
+    #[test]
+    fn what_burns_hides_the_flame_below_it_and_nothing_above() {
+        // B rises from 0 at the left side to 0.4 at the right one.
+        let (tables, edges) = tables(|shape| shape.fuel_outline = curve(&[[0.0, 0.0], [1.0, 0.4]]));
+        let pixel = [1e-3, 1e-3];
+        let coverage = |x: f32, y: f32| {
+            bansho_base::dispatch_baseline!(simd => {
+                let (x, y) = (Lanes::splat(simd, x), Lanes::splat(simd, y));
+                let mut coordinates = tables.coordinates(x, y, &edges, pixel);
+                tables.hide_below_fuel(&mut coordinates, x, y, pixel);
+                coordinates.coverage(pixel)[3]
+            })
+        };
+        assert_eq!([0.198, 0.202].map(|y| coverage(0.5, y)), [0.0, 1.0]);
+        assert_eq!([0.158, 0.162].map(|y| coverage(0.4, y)), [0.0, 1.0]);
+    }
+
+    fn curve(points: &[[f64; 2]]) -> Curve {
+        Curve::new(points.to_vec(), bansho_base::math::curve::Interpolation::Linear).unwrap()
+    }
 }

@@ -157,22 +157,22 @@ pub(super) fn mix_equalized<N: Real>(a: N, b: N) -> N {
 
 /// How one layer is mapped to the table.
 #[derive(Clone, Copy, Debug)]
-struct LayerMapping {
+pub(crate) struct LayerMapping {
     /// Table widths across the sheet.
-    widths: f64,
+    pub(crate) widths: f64,
     /// Table widths of slant per sheet height.
-    slant: f64,
+    pub(crate) slant: f64,
     /// Table heights per sheet height.
-    heights: f64,
+    pub(crate) heights: f64,
     /// Speed relative to the scroll speed.
-    rate: f64,
+    pub(crate) rate: f64,
     /// Offset, in table widths and heights.
-    start: [f64; 2],
+    pub(crate) start: [f64; 2],
 }
 
 impl LayerMapping {
     /// The mapping for tongues `width` times as wide and `length` times as long, which rise at `speed` times the scroll speed and repeat with the loop.
-    fn fitted(self, [width, length]: [f64; 2], speed: f64, clock: &Clock) -> Self {
+    pub(crate) fn fitted(self, [width, length]: [f64; 2], speed: f64, clock: &Clock) -> Self {
         let heights = self.heights / length;
         // The number of tables that pass in a loop is rounded to an integer: by a stretch of at most 25 %, and beyond that by the speed.
         let layer_speed = self.rate * speed.max(1e-3);
@@ -184,7 +184,7 @@ impl LayerMapping {
     }
 
     /// The mapping in texels after `scroll` sheet heights.
-    fn after(self, scroll: f64) -> TextureLayer {
+    pub(crate) fn after(self, scroll: f64) -> TextureLayer {
         let layer_scroll = self.rate * scroll;
         let column = math::reduce_phase(self.start[0] - self.slant * layer_scroll);
         let row = math::reduce_phase(self.start[1] - self.heights * layer_scroll);
@@ -203,6 +203,7 @@ impl LayerMapping {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FractalLayers {
     mappings: [LayerMapping; 2],
+    overlap: bool,
 }
 
 impl FractalLayers {
@@ -222,12 +223,18 @@ impl FractalLayers {
         };
         let fine =
             LayerMapping { widths: -0.71, slant: -0.104_7, heights: 0.419, rate: 1.21, start: [start[2], start[3]] };
-        Self { mappings: [coarse, fine].map(|mapping| mapping.fitted([width, length], speed, clock)) }
+        Self { mappings: [coarse, fine].map(|mapping| mapping.fitted([width, length], speed, clock)), overlap: false }
+    }
+
+    /// The same layers, which overlap instead of being mixed if `overlap`.
+    pub(crate) fn overlapping(self, overlap: bool) -> Self {
+        Self { overlap, ..self }
     }
 
     /// The texture after `scroll` sheet heights; `table` is [`FRACTAL`] or a filtered copy of it.
     pub(crate) fn at(&self, table: &Arc<TextureTable>, scroll: f64) -> FlameTexture {
-        FlameTexture::Mixed(table.clone(), self.layers(scroll))
+        let kind = if self.overlap { FlameTexture::Overlapping } else { FlameTexture::Mixed };
+        kind(table.clone(), self.layers(scroll))
     }
 
     /// The mappings of both layers to their table after `scroll` sheet heights.

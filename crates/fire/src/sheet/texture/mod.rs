@@ -14,7 +14,7 @@ use bansho_base::math::{
 };
 use fearless_simd::{Simd, dispatch};
 use fractal::FRACTAL;
-pub(crate) use fractal::{FractalLayers, fractal_noise};
+pub(crate) use fractal::{FractalLayers, LayerMapping, fractal_noise};
 pub(crate) use paper::{PaperLayer, PaperSum};
 pub use paper::{PaperTexture, paper_texture};
 
@@ -69,7 +69,7 @@ impl TextureTable {
     }
 
     /// One bilinear lookup at wrapped coordinates of at least -2^16 texels.
-    fn bilinear(&self, column: f32, row: f32) -> f32 {
+    pub(crate) fn bilinear(&self, column: f32, row: f32) -> f32 {
         // The sides are powers of two: also a negative column or row, which becomes a large number, wraps.
         let (left, below) = (column.floor() as i32 as usize, row.floor() as i32 as usize);
         let (across, up) = (column - column.floor(), row - row.floor());
@@ -160,9 +160,22 @@ impl TextureLayer {
     /// Looks up the layer at sixteen points.
     #[inline(always)]
     pub(crate) fn sample<S: Simd>(&self, table: &TextureTable, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
+        let (column, row) = self.texel(u, w);
+        table.sample(column, row)
+    }
+
+    /// Column and row of the table at one point.
+    pub(crate) fn texel_at(&self, [u, w]: [f32; 2]) -> (f32, f32) {
+        let column = u * self.columns_per_u + w * self.columns_per_w + self.first_column;
+        (column, w * self.rows_per_w + self.first_row)
+    }
+
+    /// Column and row of the table at sixteen points.
+    #[inline(always)]
+    pub(crate) fn texel<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
         let slant = w.fma(w.broadcast(self.columns_per_w), w.broadcast(self.first_column));
         let column = u.fma(u.broadcast(self.columns_per_u), slant);
-        table.sample(column, w.fma(w.broadcast(self.rows_per_w), w.broadcast(self.first_row)))
+        (column, w.fma(w.broadcast(self.rows_per_w), w.broadcast(self.first_row)))
     }
 }
 
@@ -173,6 +186,8 @@ pub(crate) enum FlameTexture {
     Single(Arc<TextureTable>, TextureLayer),
     /// A coarse and a fine layer, each uniformly distributed over [0, 1], mixed so that the result is uniformly distributed too.
     Mixed(Arc<TextureTable>, [TextureLayer; 2]),
+    /// The same layers, each with its own threshold: flames one behind the other, whose soot adds.
+    Overlapping(Arc<TextureTable>, [TextureLayer; 2]),
     /// Eq. (20) itself, after a scroll in sheet heights.
     Exact(PaperSum, f64),
 }
@@ -182,7 +197,9 @@ impl FlameTexture {
     #[inline(always)]
     pub(crate) fn texels(&self) -> [f32; 2] {
         match self {
-            Self::Single(_, fine) | Self::Mixed(_, [_, fine]) => [fine.columns_per_u.abs(), fine.rows_per_w.abs()],
+            Self::Single(_, fine) | Self::Mixed(_, [_, fine]) | Self::Overlapping(_, [_, fine]) => {
+                [fine.columns_per_u.abs(), fine.rows_per_w.abs()]
+            }
             Self::Exact(..) => [0.0; 2],
         }
     }
@@ -192,7 +209,7 @@ impl FlameTexture {
     pub(crate) fn sample<S: Simd>(&self, u: Lanes<S>, w: Lanes<S>) -> Lanes<S> {
         match self {
             Self::Single(table, layer) => layer.sample(table, u, w),
-            Self::Mixed(table, [coarse, fine]) => {
+            Self::Mixed(table, [coarse, fine]) | Self::Overlapping(table, [coarse, fine]) => {
                 fractal::mix_equalized(coarse.sample(table, u, w), fine.sample(table, u, w))
             }
             Self::Exact(sum, scroll) => sum.sample(u, w, *scroll),

@@ -9,6 +9,7 @@ use super::{
 };
 use crate::sheet::{
     animate::warp::WarpState,
+    eddies::EddyState,
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
     texture::FlameTexture,
 };
@@ -25,6 +26,8 @@ pub(crate) struct SheetState {
     pub(crate) warp: WarpState,
     /// T0.
     pub(crate) texture: FlameTexture,
+    /// Eddies that displace outline and texture.
+    pub(crate) eddies: Option<EddyState>,
     /// Size of a pixel, or of a cell, in x' and in y.
     pub(crate) pixel: [f32; 2],
 }

@@ -24,6 +24,8 @@ use crate::sheet::{
 /// A fire 1.1 m wide and 1.7 m high without sway and flicker, sampled once per exposure.
 fn still_fire(field: SootFieldParameters) -> FlameSheetParameters {
     FlameSheetParameters {
+        width: 1.1,
+        height: 1.7,
         method: SheetMethod::SootField,
         soot_field: field,
         shape: SheetShapeParameters { sway: 0.0, flicker: 0.0, ..SheetShapeParameters::default() },
