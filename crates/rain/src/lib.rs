@@ -44,7 +44,7 @@
 //!    the rain: a `lattice` of cells for each diameter, displaced by the wind, with `gust`s on top.
 //! 3. `lighting` prepares lamps, the sky through drops at the corners of a tile grid, and single scattering along lines of sight.
 //! 4. `streaks::project` visits the visible cells, nearest first, and turns batches of sixteen drops (`streaks::project_lanes`, of a fisheye or a panorama
-//!    `streaks::project_curvilinear`) into lit streaks; a long exposure is drawn in parts (`render::streak_parts`). On
+//!    `streaks::project_curvilinear`) into lit streaks; a long exposure is drawn in parts (`streaks::exposure_parts`). On
 //!    [`billboards`], drops come from the positions of a streak texture; on the ground `streaks::splashes` adds droplets. With `method = "textures"`,
 //!    [`textured_billboards`] draws the paper's textures instead. [`Rain::drops`] lists the drops as data.
 //! 5. `streaks::bin` sorts packed streaks into tiles of 128 x 8 pixels, in chunks.

@@ -2,6 +2,7 @@
 
 pub(crate) mod bin;
 pub mod coverage;
+pub(crate) mod exposure_parts;
 pub mod oscillation;
 pub(crate) mod project;
 pub(crate) mod project_curvilinear;
