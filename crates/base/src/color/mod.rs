@@ -4,9 +4,10 @@
 //! 2. [`space`]: XYZ (D65) and linear sRGB enter the working space, ACEScg, by Bradford adaptation D65 -> D60, and leave it
 //!    by the inverse. Emitted light is absolute: [`luminance`] is in cd/m^2. Negative components are colors outside AP1 and are kept.
 //! 3. [`exposure`]: `exposed = luminance * exposure_scale(ev100)`, so that 1.0 is display white.
-//! 4. [`View`]: exposed ACEScg to display pixels, first by the camera's [`WhiteBalance`] if it has one. The tone curve ([`display::tone`]) acts on the largest component, highlights
-//!    desaturate toward white and colors outside sRGB lose saturation ([`display::gamut`]), followed by sRGB encoding ([`display::transfer`]), [`display::alpha`] and dither ([`display::quantize`]).
-//!    The view is invertible on the whole sRGB cube ([`View::to_scene`]), so a plate in an empty scene is unchanged.
+//! 4. [`View`]: exposed ACEScg to display pixels. First the camera's [`WhiteBalance`] if it has one, then the transform of the view: `display::camera_response` (the
+//!    default), [`display::tone`] and [`display::gamut`] (only the views `neutral` and `standard`), or `display::agx`; then sRGB encoding ([`display::transfer`]),
+//!    [`display::alpha`] and dither ([`display::quantize`]). `raw` only clamps. All other views are invertible on the whole sRGB cube
+//!    ([`View::to_scene`]), so a plate in an empty scene is unchanged.
 //! 5. [`LinearTransform`]: instead of the view, exposed ACEScg to half or single floats in a linear [`ColorSpace`], for programs that blend light.
 
 pub mod blackbody;

@@ -1,4 +1,4 @@
-//! Tables that all phenomena share: sky, ground, lights, obstacles.
+//! Tables that all phenomena share: sky, ground, lights, obstacles, fog.
 
 use std::{any::Any, sync::Arc};
 

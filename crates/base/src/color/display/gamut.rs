@@ -1,4 +1,5 @@
-//! From unbounded linear sRGB into the display cube: tone curve, desaturation of highlights toward white, and gamut mapping.
+//! From unbounded linear sRGB into the display cube, for the views `neutral` and `standard`: tone curve, desaturation of highlights toward white, and gamut
+//! mapping.
 //!
 //! A color is decomposed as in HSV, which also works for negative components: brightness `m = max`, saturation
 //! `s = (max - min) / max` (above 1 outside sRGB) and the position `t = (mid - min) / (max - min)` within its hue sector. Then

@@ -1,4 +1,4 @@
-//! The tone curve: maps unbounded scene brightness to display brightness from 0 to 1.
+//! The tone curve of the views `neutral` and `standard`: maps unbounded scene brightness to display brightness from 0 to 1.
 
 use crate::math::MulAdd;
 
