@@ -1,0 +1,353 @@
+"""Camera, sky, rendering, and the files of a plate.
+
+Bansho's axes are x to the right, y up and z toward the viewer; Blender's z is up and its y is Bansho's -z.
+"""
+
+import argparse
+import os
+import sys
+import tempfile
+
+import bpy
+import numpy as np
+import OpenEXR
+from mathutils import Vector
+from PIL import Image
+
+from shaders import Shader
+
+SIZE = (1280, 720)
+NORMALS_SIZE = (640, 360)
+
+
+def blender(point):
+    """A point in Bansho's axes, in Blender's."""
+    x, y, z = point
+    return (x, -z, y)
+
+
+def bansho(point):
+    """A point in Blender's axes, in Bansho's."""
+    x, y, z = point
+    return (x, z, -y)
+
+
+def options(world):
+    parser = argparse.ArgumentParser(description=f"Makes the plate `{world}`.")
+    parser.add_argument("--samples", type=int, default=400)
+    parser.add_argument("--scale", type=float, default=1.0, help="size of a trial, relative to 1280x720")
+    parser.add_argument("--crop", type=float, nargs=4, help="left, right, bottom, top, 0 to 1: only the picture of this part")
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--into", default=os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+    parser.add_argument("--passes", help="an NPZ file: rendered passes are kept there, and developed again if it exists")
+    parser.add_argument("--lamps", action="store_true", help="switch on the lamps that are left to Bansho, for comparison")
+    return parser.parse_args(sys.argv[1:])
+
+
+def empty_scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return bpy.context.scene
+
+
+def camera(position, target, vertical_fov_deg):
+    """The camera, in Bansho's terms."""
+    data = bpy.data.cameras.new("camera")
+    item = bpy.data.objects.new("camera", data)
+    scene = bpy.context.scene
+    scene.collection.objects.link(item)
+    scene.camera = item
+    item.location = blender(position)
+    direction = Vector(blender(target)) - item.location
+    item.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
+    data.sensor_fit = "VERTICAL"
+    data.sensor_height = 24.0
+    data.lens = 12.0 / np.tan(np.radians(vertical_fov_deg) / 2)
+    data.clip_start, data.clip_end = 0.05, 2000.0
+    return item
+
+
+def gradient_sky(stops, strength, clouds=0.0, cloud_color=(1.0, 1.0, 1.0), glow=None):
+    """A sky from the horizon (0) to overhead (1): `stops` are (sine of elevation, color).
+
+    `clouds` is the contrast of layers of cloud, `glow` a (direction, color, exponent) around a set sun.
+    """
+    world = bpy.data.worlds.new("sky")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    s = Shader("sky", world.node_tree)
+    direction = s.node("ShaderNodeTexCoord").outputs["Generated"]
+    up = s.axis(direction, "Z")
+    color = s.ramp(s.math("MAXIMUM", up, 0.0), *stops)
+    if glow is not None:
+        toward, glow_color, exponent = glow
+        toward = Vector(toward).normalized()
+        cosine = s.node("ShaderNodeVectorMath", {0: direction, 1: tuple(toward)}, operation="DOT_PRODUCT").outputs["Value"]
+        lobe = s.math("POWER", s.math("MAXIMUM", cosine, 0.0), exponent)
+        color = s.mix(lobe, color, glow_color, "ADD")
+    if clouds > 0.0:
+        # Project the direction on a plane overhead, so that clouds shrink toward the horizon.
+        height = s.math("ADD", s.math("MAXIMUM", up, 0.0), 0.12)
+        plane = s.combine(s.math("DIVIDE", s.axis(direction, "X"), height), s.math("DIVIDE", s.axis(direction, "Y"), height), 0.0)
+        cover = s.remap(s.noise(0.9, 9.0, 0.56, plane, 0.4), 0.34, 0.68)
+        color = s.mix(s.math("MULTIPLY", cover, clouds), color, cloud_color)
+    background = s.node("ShaderNodeBackground", {"Color": color, "Strength": strength})
+    output = s.node("ShaderNodeOutputWorld")
+    s.tree.links.new(background.outputs[0], output.inputs["Surface"])
+
+
+def area_light(position, size, color, watts, direction=(0, 0, -1), spread_deg=180.0):
+    """A rectangle of light at a point in Blender's axes."""
+    data = bpy.data.lights.new("area", "AREA")
+    data.shape = "RECTANGLE"
+    data.size, data.size_y = size
+    data.color, data.energy = color, watts
+    data.spread = np.radians(spread_deg)
+    item = bpy.data.objects.new("area", data)
+    item.location = position
+    item.rotation_euler = Vector(direction).to_track_quat("-Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(item)
+    return item
+
+
+def point_light(position, color, watts, radius=0.05, spot_deg=None):
+    data = bpy.data.lights.new("lamp", "SPOT" if spot_deg else "POINT")
+    data.color, data.energy, data.shadow_soft_size = color, watts, radius
+    if spot_deg:
+        data.spot_size, data.spot_blend = np.radians(spot_deg), 0.6
+    item = bpy.data.objects.new("lamp", data)
+    item.location = position
+    bpy.context.scene.collection.objects.link(item)
+    return item
+
+
+# Rendering
+
+def settings(scene, args, samples):
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x = round(SIZE[0] * args.scale)
+    scene.render.resolution_y = round(SIZE[1] * args.scale)
+    scene.render.resolution_percentage = 100
+    if args.threads:
+        scene.render.threads_mode, scene.render.threads = "FIXED", args.threads
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.samples = samples
+    cycles.seed = 1
+    cycles.use_adaptive_sampling = samples > 16
+    cycles.adaptive_threshold = 0.02
+    cycles.use_denoising = samples > 16
+    cycles.denoiser = "OPENIMAGEDENOISE"
+    cycles.denoising_prefilter = "ACCURATE"
+    cycles.max_bounces = 5
+    cycles.diffuse_bounces = 3
+    cycles.glossy_bounces = 3
+    cycles.transmission_bounces = 4
+    cycles.transparent_max_bounces = 12
+    cycles.sample_clamp_indirect = 6.0
+    cycles.caustics_reflective = cycles.caustics_refractive = False
+    cycles.pixel_filter_type = "BLACKMAN_HARRIS"
+    cycles.filter_width = 1.4
+    layer = scene.view_layers[0]
+    layer.use_pass_z = True
+    layer.use_pass_normal = True
+    layer.use_pass_diffuse_color = True
+    layer.use_pass_glossy_color = True
+    if args.crop:
+        scene.render.use_border = scene.render.use_crop_to_border = True
+        left, right, bottom, top = args.crop
+        scene.render.border_min_x, scene.render.border_max_x = left, right
+        scene.render.border_min_y, scene.render.border_max_y = bottom, top
+
+
+def passes(scene):
+    """Renders; the passes by name, as arrays (height, width, channels)."""
+    path = os.path.join(tempfile.mkdtemp(), "passes.exr")
+    image = scene.render.image_settings
+    if hasattr(image, "media_type"):
+        image.media_type = "MULTI_LAYER_IMAGE"
+    image.file_format = "OPEN_EXR_MULTILAYER"
+    image.color_depth = "32"
+    scene.render.filepath = path
+    bpy.ops.render.render(write_still=True)
+    result = {}
+    with OpenEXR.File(path, separate_channels=True) as file:
+        for part in range(len(file.parts)):
+            for name, channel in file.channels(part).items():
+                *_, layer, component = name.split(".")
+                result.setdefault(layer, {})[component] = channel.pixels
+    os.remove(path)
+    os.rmdir(os.path.dirname(path))
+    order = "RGBAXYZV"
+    return {name: np.stack([c[k] for k in sorted(c, key=order.index)], axis=-1) for name, c in result.items()}
+
+
+def find(all_passes, *words):
+    for name, pixels in all_passes.items():
+        if all(word in name.lower().replace(" ", "") for word in words):
+            return pixels
+    raise KeyError(f"no pass {words} in {list(all_passes)}")
+
+
+def center_depth(scene):
+    """Depth along the axis at pixel centers; 0 for the sky."""
+    cycles = scene.cycles
+    saved = cycles.samples, cycles.pixel_filter_type, cycles.filter_width, cycles.use_denoising
+    adaptive = cycles.use_adaptive_sampling
+    cycles.samples, cycles.pixel_filter_type, cycles.filter_width, cycles.use_denoising = 1, "BOX", 0.01, False
+    cycles.use_adaptive_sampling = False
+    bounces = cycles.max_bounces
+    cycles.max_bounces = 0
+    depth = find(passes(scene), "depth")[..., 0]
+    cycles.samples, cycles.pixel_filter_type, cycles.filter_width, cycles.use_denoising = saved
+    cycles.use_adaptive_sampling, cycles.max_bounces = adaptive, bounces
+    return np.where(depth < 1500.0, depth, 0.0).astype(np.float32)
+
+
+# What a lens and air do
+
+def blurred(image, sigma):
+    """A Gaussian blur by Fourier transform, with mirrored edges."""
+    pad = int(3 * sigma)
+    pad = min(pad, min(image.shape[:2]) - 1)
+    wide = np.pad(image, ((pad, pad), (pad, pad), (0, 0)), mode="reflect")
+    fy = np.fft.fftfreq(wide.shape[0])[:, None]
+    fx = np.fft.rfftfreq(wide.shape[1])[None, :]
+    kernel = np.exp(-2 * np.pi**2 * sigma**2 * (fx**2 + fy**2))
+    out = np.fft.irfft2(np.fft.rfft2(wide, axes=(0, 1)) * kernel[..., None], s=wide.shape[:2], axes=(0, 1))
+    return out[pad:pad + image.shape[0], pad:pad + image.shape[1]]
+
+
+def haze(image, depth, distance, color):
+    """Air that hides 1/e of what is at `distance` meters, and is itself of this color."""
+    far = np.where(depth > 0, depth, 1e6)[..., None]
+    transmittance = np.exp(-far / distance)
+    return image * transmittance + np.asarray(color) * (1 - transmittance)
+
+
+def veil(image, share, limit=8.0):
+    """The light that a lens scatters: a narrow and a wide halo around what is bright."""
+    scale = image.shape[1] / 1280
+    light = np.minimum(image, limit)
+    halo = 0.5 * blurred(light, 3 * scale) + 0.3 * blurred(light, 14 * scale) + 0.2 * blurred(light, 60 * scale)
+    return image * (1 - share) + share * halo
+
+
+def developed(linear, exposure, look="AgX - High Contrast"):
+    """The picture through Blender's view transform, as 8-bit sRGB."""
+    scene = bpy.context.scene
+    height, width = linear.shape[:2]
+    image = bpy.data.images.new("linear", width, height, alpha=False, float_buffer=True)
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :3] = linear[::-1]
+    image.pixels.foreach_set(pixels.ravel())
+    view = scene.view_settings
+    view.view_transform = look.split(" - ")[0]
+    view.look = look if " - " in look else "None"
+    view.exposure = exposure
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGB", "8"
+    path = tempfile.mktemp(suffix=".png")
+    image.save_render(path, scene=scene)
+    bpy.data.images.remove(image)
+    with Image.open(path) as picture:
+        result = picture.convert("RGB")
+    os.remove(path)
+    return result
+
+
+# Files
+
+def encoded(linear):
+    """Linear to sRGB, 8 bits."""
+    x = np.clip(linear, 0, 1)
+    return np.round(255 * np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)).astype(np.uint8)
+
+
+def save_jpeg(picture, path, limit):
+    """At the highest quality that fits into `limit` bytes."""
+    for quality in range(95, 40, -1):
+        picture.save(path, quality=quality, optimize=True, progressive=True, subsampling="4:2:0")
+        if os.path.getsize(path) <= limit:
+            print(f"{path}: quality {quality}")
+            return
+    raise ValueError(f"{path}: does not fit into {limit} bytes")
+
+
+def rounded(values, bits):
+    """Floats with this many bits of mantissa, which compress well."""
+    drop = 23 - bits
+    raw = np.ascontiguousarray(values, np.float32).view(np.uint32)
+    half = np.uint32(1 << (drop - 1))
+    return ((raw + half) & np.uint32(~((1 << drop) - 1) & 0xFFFFFFFF)).view(np.float32)
+
+
+def save_depth(depth, path, limit):
+    """With as many bits of mantissa as fit into `limit` bytes; half floats, which have 10, compress better where those suffice."""
+    for bits in (14, 13, 12, 11, 10, 9, 8, 7):
+        values = rounded(depth, bits)
+        if bits <= 10:
+            values = values.astype(np.float16)
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        with OpenEXR.File(header, {"Z": values}) as file:
+            file.write(path)
+        if os.path.getsize(path) <= limit:
+            print(f"{path}: {bits} bits of mantissa")
+            return
+    raise ValueError(f"{path}: does not fit into {limit} bytes")
+
+
+def save_normals(normals, path, limit):
+    """Half floats, rounded to the finest step that fits."""
+    for steps in (128, 64, 32, 16):
+        value = (np.round(normals * steps) / steps).astype(np.float16)
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        with OpenEXR.File(header, {n: np.ascontiguousarray(value[..., i]) for i, n in enumerate("XYZ")}) as file:
+            file.write(path)
+        if os.path.getsize(path) <= limit:
+            print(f"{path}: steps of 1/{steps}")
+            return
+    raise ValueError(f"{path}: does not fit into {limit} bytes")
+
+
+def camera_normals(world_normals, item):
+    """Normals in the camera's axes (x right, y up, z toward the viewer), averaged to the size of the file; 0 for the sky."""
+    axes = np.array(item.matrix_world.to_3x3())
+    n = world_normals @ axes
+    height, width = n.shape[:2]
+    rows, columns = height // NORMALS_SIZE[1], width // NORMALS_SIZE[0]
+    if rows > 1:
+        n = n.reshape(NORMALS_SIZE[1], rows, NORMALS_SIZE[0], columns, 3).mean(axis=(1, 3))
+    length = np.linalg.norm(n, axis=-1, keepdims=True)
+    return np.where(length > 0.2, n / np.maximum(length, 1e-6), 0.0)
+
+
+def make(world, args, exposure, view_camera, look="AgX - High Contrast", air=None, halo=0.06):
+    """Renders the scene and writes the plate's files: picture, depth, albedo and normals."""
+    scene = bpy.context.scene
+    bpy.context.view_layer.update()
+    settings(scene, args, args.samples)
+    if args.passes and os.path.exists(args.passes):
+        beauty = dict(np.load(args.passes))
+    else:
+        depth = center_depth(scene)
+        beauty = {**passes(scene), "center": depth}
+        if args.passes:
+            np.savez(args.passes, **beauty)
+    depth = beauty.pop("center")
+    linear = find(beauty, "combined")[..., :3]
+    if air is not None:
+        linear = haze(linear, depth, *air)
+    picture = developed(veil(linear, halo), exposure, look)
+    if args.crop or args.scale != 1.0 or args.lamps:
+        name = "_lamps" if args.lamps else ""
+        picture.save(os.path.join(args.into, f"{world}{name}.png"))
+        return
+    path = os.path.join(args.into, world)
+    save_jpeg(picture, path + ".jpg", 300_000)
+    save_depth(depth, path + "_depth.exr", 400_000)
+    albedo = find(beauty, "diffuse", "color")[..., :3]
+    albedo = albedo + 0.5 * find(beauty, "glossy", "color")[..., :3] * (albedo.max(axis=-1, keepdims=True) < 0.01)
+    save_jpeg(Image.fromarray(encoded(albedo)), path + "_albedo.jpg", 220_000)
+    save_normals(camera_normals(find(beauty, "normal"), view_camera), path + "_normals.exr", 500_000)
