@@ -329,14 +329,19 @@ def make(world, args, exposure, view_camera, look="AgX - High Contrast", air=Non
     bpy.context.view_layer.update()
     settings(scene, args, args.samples)
     if args.passes and os.path.exists(args.passes):
-        beauty = dict(np.load(args.passes))
+        rendered = dict(np.load(args.passes))
     else:
         depth = center_depth(scene)
-        beauty = {**passes(scene), "center": depth}
+        rendered = {**passes(scene), "center": depth}
         if args.passes:
-            np.savez(args.passes, **beauty)
-    depth = beauty.pop("center")
-    linear = find(beauty, "combined")[..., :3]
+            np.savez(args.passes, **rendered)
+    save(world, args, rendered, exposure, view_camera, look, air, halo)
+
+
+def save(world, args, rendered, exposure, view_camera, look, air, halo):
+    """Develops the picture from the rendered passes, and writes the files."""
+    linear = find(rendered, "combined")[..., :3]
+    depth = rendered["center"]
     if air is not None:
         linear = haze(linear, depth, *air)
     picture = developed(veil(linear, halo), exposure, look)
@@ -347,7 +352,8 @@ def make(world, args, exposure, view_camera, look="AgX - High Contrast", air=Non
     path = os.path.join(args.into, world)
     save_jpeg(picture, path + ".jpg", 300_000)
     save_depth(depth, path + "_depth.exr", 400_000)
-    albedo = find(beauty, "diffuse", "color")[..., :3]
-    albedo = albedo + 0.5 * find(beauty, "glossy", "color")[..., :3] * (albedo.max(axis=-1, keepdims=True) < 0.01)
+    albedo = find(rendered, "diffuse", "color")[..., :3]
+    metal = albedo.max(axis=-1, keepdims=True) < 0.01
+    albedo = albedo + 0.5 * find(rendered, "glossy", "color")[..., :3] * metal
     save_jpeg(Image.fromarray(encoded(albedo)), path + "_albedo.jpg", 220_000)
-    save_normals(camera_normals(find(beauty, "normal"), view_camera), path + "_normals.exr", 500_000)
+    save_normals(camera_normals(find(rendered, "normal"), view_camera), path + "_normals.exr", 500_000)

@@ -510,4 +510,4 @@ def build(args):
 if __name__ == "__main__":
     arguments = plate.options("street")
     seen = build(arguments)
-    plate.make("street", arguments, 2.1, seen, air=(140.0, (0.020, 0.016, 0.013)), halo=0.10)
+    plate.make("street", arguments, 2.4, seen, air=(140.0, (0.020, 0.016, 0.013)), halo=0.10)
