@@ -228,7 +228,7 @@ def build(args):
 
     earth = soil()
     Mesh(earth).add(shapes.grid(np.linspace(-9, 10, 480), np.linspace(-4.5, 16, 520), height)).build("ground", smooth=True)
-    Mesh(earth).add(shapes.grid(np.linspace(-70, 70, 140), np.linspace(16, 120, 100), height)).build("far ground", smooth=True)
+    Mesh(earth).add(shapes.grid(np.linspace(-70, 70, 281), np.linspace(15.4, 120, 160), lambda p: height(p) - 0.03)).build("far ground", smooth=True)
     for side in (-1, 1):
         xs = np.linspace(9.5, 60, 40)
         Mesh(earth).add(shapes.grid(side * xs if side > 0 else -xs[::-1], np.linspace(-4.5, 17, 30), height)).build("side ground", smooth=True)

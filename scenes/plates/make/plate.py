@@ -284,30 +284,42 @@ def rounded(values, bits):
 
 
 def save_depth(depth, path, limit):
-    """With as many bits of mantissa as fit into `limit` bytes; half floats, which have 10, compress better where those suffice."""
-    for bits in (14, 13, 12, 11, 10, 9, 8, 7):
-        values = rounded(depth, bits)
-        if bits <= 10:
-            values = values.astype(np.float16)
-        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    """With as many bits of mantissa as fit into `limit` bytes; half floats, which have 10, compress better where those suffice.
+
+    For foliage not even 8 bits fit: its depths are rounded to equal steps of 1 / depth, which are finer near the camera.
+    """
+    def fits(values, compression):
+        header = {"compression": compression, "type": OpenEXR.scanlineimage}
         with OpenEXR.File(header, {"Z": values}) as file:
             file.write(path)
-        if os.path.getsize(path) <= limit:
+        return os.path.getsize(path) <= limit
+
+    for bits in (14, 13, 12, 11, 10, 9, 8):
+        values = rounded(depth, bits)
+        if fits(values.astype(np.float16) if bits <= 10 else values, OpenEXR.ZIP_COMPRESSION):
             print(f"{path}: {bits} bits of mantissa")
+            return
+    for steps in (2048, 1448, 1024, 860, 724, 608, 512):
+        inverse = np.round(steps / np.maximum(depth, 0.1)) / steps
+        values = np.where((depth > 0) & (inverse > 0), 1 / np.maximum(inverse, 1e-6), 0).astype(np.float16)
+        if fits(values, OpenEXR.PIZ_COMPRESSION):
+            print(f"{path}: steps of 1/{steps} in 1 / depth")
             return
     raise ValueError(f"{path}: does not fit into {limit} bytes")
 
 
 def save_normals(normals, path, limit):
     """Half floats, rounded to the finest step that fits."""
-    for steps in (128, 64, 32, 16):
+    for steps in (128, 64, 32, 16, 8):
         value = (np.round(normals * steps) / steps).astype(np.float16)
-        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-        with OpenEXR.File(header, {n: np.ascontiguousarray(value[..., i]) for i, n in enumerate("XYZ")}) as file:
-            file.write(path)
-        if os.path.getsize(path) <= limit:
-            print(f"{path}: steps of 1/{steps}")
-            return
+        for compression in (OpenEXR.ZIP_COMPRESSION, OpenEXR.PIZ_COMPRESSION):
+            header = {"compression": compression, "type": OpenEXR.scanlineimage}
+            channels = {name: np.ascontiguousarray(value[..., i]) for i, name in enumerate("XYZ")}
+            with OpenEXR.File(header, channels) as file:
+                file.write(path)
+            if os.path.getsize(path) <= limit:
+                print(f"{path}: steps of 1/{steps}")
+                return
     raise ValueError(f"{path}: does not fit into {limit} bytes")
 
 
@@ -356,4 +368,4 @@ def save(world, args, rendered, exposure, view_camera, look, air, halo):
     metal = albedo.max(axis=-1, keepdims=True) < 0.01
     albedo = albedo + 0.5 * find(rendered, "glossy", "color")[..., :3] * metal
     save_jpeg(Image.fromarray(encoded(albedo)), path + "_albedo.jpg", 220_000)
-    save_normals(camera_normals(find(rendered, "normal"), view_camera), path + "_normals.exr", 500_000)
+    save_normals(camera_normals(find(rendered, "normal"), view_camera), path + "_normals.exr", 700_000)
