@@ -160,7 +160,7 @@ pub use bansho_aurora::AuroraParameters;
 #[doc(inline)]
 pub use bansho_base::{
     camera::CameraParameters,
-    color::{AlphaConvention, AlphaMode, ColorSpace, View},
+    color::{AlphaConvention, AlphaMode, ColorSpace, View, ViewName},
     frame::{DisplayImage, Frame},
     geometry::point_cloud::PointCloud,
     host::{
@@ -185,8 +185,8 @@ pub use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetPara
 pub use bansho_rain::RainParameters;
 #[doc(inline)]
 pub use bansho_render::{
-    BufferLengthError, BuildErrors, ChannelError, CompiledScene, PhenomenonLight, Plan, PlanError, PlanOptions,
-    RenderError, SceneLinear, Shot, Target,
+    BufferLengthError, BuildErrors, ChannelError, CompiledScene, GlareUse, PhenomenonLight, Plan, PlanError,
+    PlanOptions, RenderError, SceneLinear, Shot, Target,
     display::{BitDepth, DisplayFrame, DisplayOptions, display},
     f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f, write_rgba32f,
 };

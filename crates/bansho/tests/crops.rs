@@ -107,3 +107,20 @@ fn of_things_that_cross_in_a_pan() {
          [[flame_sheet]]\nwidth = 0.9\nheight = 1.6\nsmoke = { optical_depth = 1 }\n";
     assert_parts_agree(text, 2);
 }
+
+#[test]
+fn with_glare_from_around_the_crop() {
+    // About one and three pixels for a degree, so that crops have margins within the picture, and beyond it.
+    for fov_deg in [65.0, 22.0] {
+        let camera = format!(
+            "[camera]\nposition = [0, 1.2, 5]\ntarget = [0, 1, 0]\nvertical_fov_deg = {fov_deg}\nglare = 0.1\n"
+        );
+        let flame = "[[flame_sheet]]\n[ground]\n[sky]\n[[light]]\nvisible = true\nposition = [0.7, 1.4, -1]\n";
+        assert_parts_agree(&format!("bansho = 2\n{flame}{camera}"), 3);
+        // Hot air, for which the whole picture is drawn.
+        let gas = "[[flame_particles]]\nparticles = 1500\npreroll_s = 1\n[sky]\n[ground]\n";
+        assert_parts_agree(&format!("bansho = 2\n{gas}{camera}"), 3);
+    }
+    let panorama = "[camera]\nlens = \"panorama\"\nglare = 0.1\n[[flame_sheet]]\n[ground]\n";
+    assert_parts_agree(&format!("bansho = 2\n{panorama}"), 3);
+}

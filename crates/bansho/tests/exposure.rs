@@ -77,7 +77,7 @@ fn a_plates_exposure_is_the_stated_one_then_the_recorded_one_then_an_assumed_one
     assert_eq!(ev(&format!("exposure_ev100 = 7.0\n{PLATE}{RAIN}"), Some(3.0)), (7.0, None));
     assert_eq!(ev(&format!("{PLATE}[sky]\nluminance = 1536.0\n{RAIN}"), None), (10.6, assumed(10.6)));
     let fire = "[[flame_sheet]]\ncolor = { luminance = 12000.0 }\n";
-    assert_eq!(ev(&format!("{PLATE}{fire}"), None), (10.7, assumed(10.7)));
+    assert_eq!(ev(&format!("{PLATE}{fire}"), None), (10.1, assumed(10.1)));
     assert_eq!(ev(&format!("{PLATE}exposure_ev100 = \"auto\"\n{fire}"), Some(8.0)), (8.0, None));
 }
 

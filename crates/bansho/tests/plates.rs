@@ -26,7 +26,7 @@ use support::{draw, plan_with};
 const EMPTY: &str = "bansho = 2\n[picture]\nsize = [24, 16]\nframes = 1\n";
 
 fn standard() -> PlanOptions {
-    PlanOptions { display: View::STANDARD, ..PlanOptions::default() }
+    PlanOptions { display: Some(View::STANDARD), ..PlanOptions::default() }
 }
 
 /// An empty scene over the plate `picture`.

@@ -83,7 +83,7 @@ impl Products {
     pub fn check(&self, job: &Job, folder: &Path) -> Result<Option<PreparedFlipbook>, FarmError> {
         if let Some(film) = &self.film {
             let kind = film_pattern(film)?.kind();
-            check_view(job.view, kind, film).map_err(JobError::from)?;
+            check_view(job.prepare()?.plan().display, kind, film).map_err(JobError::from)?;
         }
         if let Some(count) = self.contact_sheet {
             job.prepare()?.contact_sheet_layout(count)?;

@@ -22,6 +22,9 @@ pub const GAS_FLOW: &str = "gas flow";
 /// stays where it is.
 pub const POSITION: &str = "position";
 
+/// What the bright parts of flames are at automatic exposure, relative to display white: a camera that is set for the flame clips 1 to 10 % of it.
+pub(crate) const EXPOSED_LUMINANCE: f64 = 2.6;
+
 /// Color of the chemiluminescence of burning hydrocarbons, the CH (431 nm) and C2 (516 nm) bands: ACEScg of luminance 1.
 pub(crate) fn chemiluminescence_color() -> [f32; 3] {
     let (ch, c2) = (color::line_xyz(431.0), color::line_xyz(516.0));

@@ -116,7 +116,7 @@ impl<C: DisplayCode + Send> StripPixels for CodeStrip<'_, C> {
         if rect != drawn {
             buffer.fill([0.0; 4]);
         }
-        StripLight { rect, beauty: buffer, depth: &mut [] }
+        StripLight { rect, beauty: buffer, depth: &mut [], drawn: &mut [] }
     }
 
     fn convert(&mut self, strip: Rect, drawn: Rect, buffer: &[[f32; 4]]) {

@@ -21,11 +21,11 @@ pub mod shot;
 pub mod target;
 
 pub use compiled::{BuildErrors, CompiledScene};
-pub use composite::moments::moment_bytes_per_thread;
+pub use composite::{glare::source_window, moments::moment_bytes_per_thread};
 pub use pixels::{
     BufferLengthError, ChannelError, f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f,
     write_rgba32f,
 };
-pub use plan::{Plan, PlanError, PlanOptions};
+pub use plan::{DEFAULT_GLARE, GlareUse, Plan, PlanError, PlanOptions};
 pub use shot::{PhenomenonLight, RenderError, Shot, snapshot};
 pub use target::{SceneLinear, Target};

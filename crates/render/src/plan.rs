@@ -15,6 +15,32 @@ use bansho_base::{
 use crate::fingerprint::{self, Fingerprint};
 use bansho_scene::{FrameRate, PlateView, Scene};
 
+/// Fraction of the light that the lens of a camera scatters over a picture for display, if its scene states none: that of a clean zoom lens with a filter.
+pub const DEFAULT_GLARE: f64 = 0.03;
+
+/// Whether the pictures of a shot have the glare of the camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GlareUse {
+    /// If the scene states it: for pictures that others composite, such as flipbooks and live effects.
+    #[default]
+    Stated,
+    /// Also by default, as in finished pictures for display.
+    Always,
+    /// Not at all: scene-linear light, to which a compositor adds the glare of the camera.
+    Never,
+}
+
+impl GlareUse {
+    /// The fraction of the light that is scattered, where the scene states `stated`.
+    fn fraction(self, stated: Option<f64>) -> f64 {
+        match self {
+            Self::Stated => stated.unwrap_or(0.0),
+            Self::Always => stated.unwrap_or(DEFAULT_GLARE),
+            Self::Never => 0.0,
+        }
+    }
+}
+
 /// Options of a shot that its scene does not state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlanOptions {
@@ -30,8 +56,10 @@ pub struct PlanOptions {
     pub aovs: bool,
     /// Whether frames carry the phenomena's metadata.
     pub metadata: bool,
-    /// The view transform of display formats. Its inverse is applied to a plate that is made for display.
-    pub display: color::View,
+    /// Whether pictures have the glare of the camera.
+    pub glare: GlareUse,
+    /// The view transform of display formats; `None` for that of the scene. Its inverse is applied to a plate that is made for display.
+    pub display: Option<color::View>,
 }
 
 /// Why a shot cannot be planned.
@@ -82,6 +110,8 @@ pub struct Plan {
     pub depth: bool,
     /// Whether frames carry the phenomena's metadata.
     pub metadata: bool,
+    /// Fraction of the light that the lens scatters over the picture; 0 for pictures without glare.
+    pub glare: f64,
     /// The view transform of display formats, without the camera's white balance.
     pub display: color::View,
     /// Whether the headers of frames get a fingerprint of all that their pixels depend on; otherwise it is 0. It takes about as long as drawing a small
@@ -113,7 +143,8 @@ impl Plan {
             aovs: options.aovs,
             metadata: options.metadata,
             depth: true,
-            display: options.display,
+            glare: options.glare.fraction(scene.camera.glare),
+            display: options.display.unwrap_or_else(|| scene.picture.view.into()),
             fingerprint_frames: true,
             camera: scene.camera.clone(),
             scene,
@@ -233,6 +264,7 @@ impl Plan {
         let mut view = View::new(self.camera.clone(), shutter, next, self.size, overscan);
         view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
         view.aovs_requested = self.aovs;
+        view.glare_is_added = self.glare > 0.0;
         let view = view.with_window(self.window);
         match self.loop_s() {
             Some(seconds) => view.in_loop(seconds),
@@ -263,7 +295,8 @@ impl Plan {
         fingerprint::hash_line("size", format_args!("{:?} {:?}", self.size, self.window), &mut hasher);
         fingerprint::hash_line("exposure", self.exposure_ev100, &mut hasher);
         fingerprint::hash_line("outputs", format_args!("{} {}", self.layers, self.aovs), &mut hasher);
-        fingerprint::hash_line("view", self.display.name(), &mut hasher);
+        fingerprint::hash_line("glare", self.glare, &mut hasher);
+        fingerprint::hash_line("view", self.display.name().name(), &mut hasher);
         if let Some(kelvin) = self.scene.picture.white_balance_k {
             fingerprint::hash_line("white balance", kelvin, &mut hasher);
         }

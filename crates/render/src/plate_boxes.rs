@@ -241,7 +241,7 @@ mod tests {
     }
 
     fn boxes(picture: &Picture) -> PlateBoxes {
-        PlateBoxes::new(picture, picture.alpha, &color::View::DISPLAY)
+        PlateBoxes::new(picture, picture.alpha, &color::View::NEUTRAL)
     }
 
     /// The mean over the plate, and the number of pixels that it is of.

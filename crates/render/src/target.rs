@@ -5,7 +5,7 @@ use bansho_base::{
     host::observer::Cancelled,
 };
 
-use crate::composite::{composition::Composition, light_frame, refraction};
+use crate::composite::{background::LightFrame, composition::Composition, light_frame, refraction};
 
 /// What [`Shot::draw`](crate::Shot::draw) draws a frame as: [`SceneLinear`] light, as for EXR files and for buffers of a program, or display codes of 8 or 16 bits
 /// by [`DisplayOptions`](crate::display::DisplayOptions), as for PNG files and films. Both have the same pixels: the codes are those of the light.
@@ -41,6 +41,21 @@ impl Target for SceneLinear {
     }
 }
 
+/// The target for light from which glare is computed.
+pub(crate) struct WithoutGlare;
+
+impl Target for WithoutGlare {
+    type Frame = LightFrame;
+
+    fn of_light(&self, frame: Frame, _spare: &mut Option<Frame>) -> LightFrame {
+        LightFrame { frame, drawn: None }
+    }
+
+    fn draw(&self, drawing: Drawing, recycled: &mut Option<Frame>) -> Result<LightFrame, Cancelled> {
+        drawing.light_frame(recycled.take())
+    }
+}
+
 /// A frame that is ready to be drawn.
 pub struct Drawing<'a> {
     pub(crate) composition: &'a Composition<'a>,
@@ -58,9 +73,15 @@ impl Drawing<'_> {
 
     /// Draws scene-linear light in the memory of an earlier frame.
     pub(crate) fn light(self, recycled: Option<Frame>) -> Result<Frame, Cancelled> {
+        Ok(self.light_frame(recycled)?.frame)
+    }
+
+    /// As [`light`](Self::light), with the light that is not the plate's, where it is kept apart.
+    fn light_frame(self, recycled: Option<Frame>) -> Result<LightFrame, Cancelled> {
         let draw = if self.is_refracted { refraction::draw_frame } else { light_frame::draw_frame };
-        let frame = draw(self.composition, self.header, recycled)?;
-        Ok(Frame { metadata: self.metadata, ..frame })
+        let mut light = draw(self.composition, self.header, recycled)?;
+        light.frame.metadata = self.metadata;
+        Ok(light)
     }
 }
 
@@ -69,4 +90,5 @@ pub(crate) mod sealed {
     pub trait Sealed {}
 
     impl Sealed for super::SceneLinear {}
+    impl Sealed for super::WithoutGlare {}
 }

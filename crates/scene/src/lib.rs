@@ -30,7 +30,7 @@ pub use self::{
     tables::{
         depth::{DepthDoubt, DepthFit, DepthScale, DepthValues},
         ground_fit::{GroundFit, PlateView},
-        kinds::{self, PLATE_LAYER},
+        kinds::{self, GLARE_LAYER, PLATE_LAYER},
         picture::{self, DepthKind, FrameRate, PictureParameters, PlateAlpha, PlateParameters},
         plate::{PlateDepth, PlatePictures, PlateRemark},
     },

@@ -67,8 +67,10 @@ pub struct Job {
     pub aovs: bool,
     /// Whether a JSON file with the metadata of the frame is written beside each picture (PNG and EXR).
     pub metadata: bool,
-    /// The view transform of display formats.
-    pub view: View,
+    /// The view transform of display formats; `None` for that of the scene.
+    pub view: Option<View>,
+    /// Whether scene-linear files (EXR) have the glare of the camera too; as a layer `glare`, if they have layers.
+    pub scene_linear_glare: bool,
     /// Bits of each channel, where the format supports both depths.
     pub bits: BitDepth,
     /// Convention of straight alpha. `None` is [`AlphaConvention::Encoded`], but linear for the view `raw`, which encodes nothing.
@@ -103,7 +105,8 @@ impl Job {
             layers: false,
             aovs: false,
             metadata: false,
-            view: View::DISPLAY,
+            view: None,
+            scene_linear_glare: false,
             bits: BitDepth::Eight,
             alpha: None,
             out: None,

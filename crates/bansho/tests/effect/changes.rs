@@ -29,9 +29,11 @@ fn flames_are_lit_put_out_and_moved_without_a_jump() {
         assert!(largest < usual.max(0.35), "{name}: {largest} {usual}");
         assert!(dying[180] < 1e-3 * full, "{name}: {} of {full}", dying[180]);
         live.ignite(name).unwrap();
-        live.advance(1.0).unwrap();
-        let lit = light_of(&mut live, 1.0);
-        assert!(sum(&lit) > 0.3 * full, "{name}: {} of {full}", sum(&lit));
+        live.advance(1.5).unwrap();
+        // The mean of half a second, since flames flicker.
+        let relit = series(&mut live, 30).iter().sum::<f64>() / 30.0;
+        assert!(relit > 0.3 * full, "{name}: {relit} of {full}");
+        let lit = light_of(&mut live, 1.0 / 60.0);
         live.move_to(name, [0.7, 0.0, 0.0], 0.5).unwrap();
         let now = light_of(&mut live, 1.0 / 60.0);
         assert!((center(&now) - center(&lit)).abs() < 1.0, "{name}");

@@ -109,7 +109,7 @@ fn bytes_are_those_of_the_display_picture() {
         for view in [View::DISPLAY, View::STANDARD, View::RAW] {
             for alpha in [AlphaConvention::Linear, AlphaConvention::Encoded] {
                 let shown = eight_bits(display(&frame, &view, BitDepth::Eight, alpha));
-                assert_eq!(rgba8(&frame, &view, AlphaMode::Straight(alpha)), shown, "{} {alpha:?}", view.name());
+                assert_eq!(rgba8(&frame, &view, AlphaMode::Straight(alpha)), shown, "{} {alpha:?}", view.name().name());
             }
         }
     }

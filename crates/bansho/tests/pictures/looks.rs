@@ -43,7 +43,8 @@ fn look_at<T>(
 
 fn draw(text: &str, size: [usize; 2], frames: &[i64], options: &SceneOptions, depth: BitDepth) -> Vec<DisplayImage> {
     look_at(text, size, frames, options, |frame| {
-        bansho::display(frame, &View::DISPLAY, depth, bansho::AlphaConvention::Linear)
+        // In this view, what a display can show is shown as it is: means of its light are those of the scene.
+        bansho::display(frame, &View::NEUTRAL, depth, bansho::AlphaConvention::Linear)
     })
 }
 
@@ -227,7 +228,10 @@ pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String
         text = text.replace("count = 120_000", "count = 12_000");
         name = format!("{scene}_{frame}");
     }
-    let image = &draw(&text, size, &[frame], &SceneOptions::default(), BitDepth::Eight)[0];
+    // As users see it, in the view of the scene.
+    let view = bansho::parse_scene(scene, &text).unwrap_or_else(|error| panic!("{error}")).picture.view;
+    let look = |frame: &Frame| bansho::display(frame, &view.into(), BitDepth::Eight, bansho::AlphaConvention::Linear);
+    let image = &look_at(&text, size, &[frame], &SceneOptions::default(), look)[0];
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{name}.png"));
     if std::env::var_os("BANSHO_BLESS").is_some() {
         write_png(&path, image);

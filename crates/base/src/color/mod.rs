@@ -23,7 +23,7 @@ pub use display::{
     alpha::{AlphaConvention, AlphaMode},
     quantize::{BitDepth, DisplayCode},
     transfer::{decode_srgb, decode_srgb8, encode_srgb},
-    view::{UnknownView, View},
+    view::{View, ViewName},
 };
 pub use exposure::{MAX_EV100, ev100_of_camera, ev100_of_white_luminance, exposure_scale, white_luminance};
 pub use pixel_formats::{ColorSpace, LinearTransform};

@@ -198,6 +198,12 @@ pub trait Phenomenon: Send + Sync {
     /// Luminance of its bright parts, cd/m^2, from which `exposure_ev100 = "auto"` is determined once per shot.
     fn luminance(&self) -> f64;
 
+    /// What that luminance is at automatic exposure, relative to display white. The default is high enough that a core is nearly white, and low enough that its
+    /// edges keep their color.
+    fn exposed_luminance(&self) -> f64 {
+        1.7
+    }
+
     /// Memory of the phenomenon, a run of it and a prepared frame of `pixels` pixels, bytes, to a factor of one and a half: for the check before a job. What
     /// [`shared_memory`](Self::shared_memory) tells is left out.
     fn memory_bytes(&self, _pixels: f64) -> f64 {

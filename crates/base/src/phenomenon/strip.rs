@@ -131,6 +131,8 @@ pub struct View {
     pub mirror: Option<f64>,
     /// Luminance of display white, cd/m^2, if known: light far below it need not be drawn.
     pub white_luminance: Option<f64>,
+    /// Whether the glare of the lens is added to the picture as a whole, so that phenomena add none of their own.
+    pub glare_is_added: bool,
     /// Whether AOVs are requested; strips then have planes for them.
     pub aovs_requested: bool,
     /// Where the positions of exported particles count from, m: the same for all frames of a shot.
@@ -165,6 +167,7 @@ impl View {
             window: Rect::from_size(size[0], size[1]),
             mirror: None,
             white_luminance: None,
+            glare_is_added: false,
             aovs_requested: false,
             export_origin,
             adjacent_loop_view: None,
@@ -174,6 +177,12 @@ impl View {
     /// The view of another region of the picture.
     pub fn with_window(self, window: Rect) -> Self {
         self.with_adjacent_loop_view(|view| view.window = window)
+    }
+
+    /// The view of the whole picture.
+    #[must_use]
+    pub fn with_whole_window(&self) -> Self {
+        self.clone().with_window(Rect::from_size(self.size[0], self.size[1]))
     }
 
     /// The view within a loop of `period` seconds.

@@ -60,9 +60,9 @@ pub(crate) struct FlipbookArgs {
     /// Also write NAME.gltf: the lights of the flames as animated point lights, which engines and Blender import.
     #[arg(long)]
     gltf: bool,
-    /// View transform of .png.
-    #[arg(long, default_value = "display", value_parser = values::view_parser())]
-    view: View,
+    /// View transform of .png. [default: `picture.view` of the scene]
+    #[arg(long, value_parser = values::view_parser())]
+    view: Option<View>,
     #[command(flatten)]
     inputs: InputArgs,
     #[command(flatten)]

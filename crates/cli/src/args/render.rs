@@ -39,9 +39,12 @@ pub(crate) struct RenderArgs {
     /// Bits per channel of .png, .apng, .mov and .webm.
     #[arg(long, default_value = "8", value_parser = values::bits_parser(), help_heading = "Output")]
     bits: BitDepth,
-    /// View transform of display formats; `raw` writes linear values, clamped to 0 to 1.
-    #[arg(long, default_value = "display", value_parser = values::view_parser(), help_heading = "Output")]
-    view: View,
+    /// View transform of display formats; `raw` writes linear values, clamped to 0 to 1. [default: `picture.view` of the scene]
+    #[arg(long, value_parser = values::view_parser(), help_heading = "Output")]
+    view: Option<View>,
+    /// Add the glare of the camera (`camera.glare`) to .exr too; with --layers as the layer `glare`. Pictures and films for display always have it.
+    #[arg(long, help_heading = "Output")]
+    glare: bool,
     /// Convention of straight alpha (.png .apng .mov .webm): `encoded` for programs that blend encoded values, such as browsers, 8-bit image
     /// editors and video players; `linear` for those that blend linear light, such as compositors. [default: encoded; linear for
     /// `--view raw`]
@@ -129,6 +132,7 @@ impl RenderArgs {
             aovs: self.aovs,
             metadata: self.metadata,
             view: self.view,
+            scene_linear_glare: self.glare,
             bits: self.bits,
             alpha: self.alpha,
             out: self.out.clone(),

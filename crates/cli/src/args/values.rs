@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bansho::{
-    AlphaConvention, BitDepth, Rect, View,
+    AlphaConvention, BitDepth, Rect, View, ViewName,
     job::frames::{self, FrameListError},
     job::{ContactBackground, FlipbookCrop, StreakFormat},
     rain::{OpacityLaw, VelocityLaw},
@@ -168,7 +168,8 @@ pub(super) fn streak_format_parser() -> impl TypedValueParser<Value = StreakForm
 }
 
 pub(super) fn view_parser() -> impl TypedValueParser<Value = View> {
-    PossibleValuesParser::new(View::NAMES).try_map(|name| View::from_name(&name))
+    let names = ViewName::CHOICES.iter().map(|choice| choice.name);
+    PossibleValuesParser::new(names).map(|name| ViewName::from_name(&name).unwrap_or_default().into())
 }
 
 pub(super) fn contact_background_parser() -> impl TypedValueParser<Value = ContactBackground> {

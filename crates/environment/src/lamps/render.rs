@@ -104,7 +104,8 @@ pub(super) fn project_lamp(lamp: &Lamp, view: &View) -> Option<Disc> {
     // Luminance times solid angle, I / (pi r^2) 2 pi (1 - cos a) with sin a = r / d: the illuminance I / d^2 but for spheres right before the lens, whose
     // edge shines obliquely on a surface that faces their center.
     let whole = 2.0 / (1.0 + math::cos(seen_radius));
-    let scale = (1.0 - GLARE_FRACTION) * whole / disc.solid_angle_covered();
+    let kept = if view.glare_is_added { 1.0 } else { 1.0 - GLARE_FRACTION };
+    let scale = kept * whole / disc.solid_angle_covered();
     Some(Disc { radiance: illuminance.map(|value| (value * scale) as f32), ..disc })
 }
 
@@ -160,9 +161,9 @@ impl Disc {
     }
 }
 
-/// Whether the lens adds glare: not in mirrored views.
+/// Whether lamps have a glare of their own: not in mirrored views, nor where the whole picture gets glare.
 pub(super) fn has_glare(view: &View) -> bool {
-    view.mirror.is_none()
+    view.mirror.is_none() && !view.glare_is_added
 }
 
 /// The lamps of a frame, nearest first.

@@ -134,6 +134,10 @@ impl Phenomenon for FlameParticles {
         BRIGHT_PARTS * black_body * emissivity
     }
 
+    fn exposed_luminance(&self) -> f64 {
+        crate::EXPOSED_LUMINANCE
+    }
+
     fn remark(&self, neighbors: &OtherPhenomena) -> Option<Remark> {
         let burners = &self.constants.derived.burners;
         if !burners.iter().any(Burner::emits_gas) {

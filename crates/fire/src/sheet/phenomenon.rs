@@ -99,6 +99,10 @@ impl Phenomenon for FlameSheet {
         BRIGHT_PARTS * self.parameters.color.luminance.bounds()[1]
     }
 
+    fn exposed_luminance(&self) -> f64 {
+        crate::EXPOSED_LUMINANCE
+    }
+
     fn view_remark(&self, view: &View) -> Option<Remark> {
         self.edge_on_remark(view)
     }

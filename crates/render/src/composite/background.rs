@@ -11,11 +11,20 @@ use bansho_base::{
 use super::plate::PlateFrame;
 use fearless_simd::dispatch;
 
+/// A frame of scene-linear light.
+pub(crate) struct LightFrame {
+    pub(crate) frame: Frame,
+    /// The beauty without the light of the plate, where it is kept apart for the [glare](super::glare).
+    pub(crate) drawn: Option<Image<4>>,
+}
+
 /// The background of some slices, as large as the whole picture.
 #[derive(Clone, Copy)]
 pub(crate) struct Background<'a> {
     /// Exposed radiance and alpha.
     pub(crate) color: Option<&'a Image<4>>,
+    /// Exposed radiance of what has been drawn, without that of the plate; `None` if it is not kept apart.
+    drawn: Option<&'a Image<4>>,
     /// Depth, m, in rows.
     depth: Option<&'a [f32]>,
     /// Layers and AOVs of what has been drawn; empty for a plate.
@@ -36,12 +45,13 @@ impl<'a> Background<'a> {
     /// The plate.
     pub(crate) fn plate(plate: &'a PlateFrame) -> Self {
         let depth = plate.depth.as_ref().map(|depth| depth.pixels().as_flattened());
-        Self { color: plate.color.as_ref(), depth, channels: &[], air: None }
+        Self { color: plate.color.as_ref(), drawn: None, depth, channels: &[], air: None }
     }
 
     /// A frame that has been drawn.
-    pub(crate) fn drawn(frame: &'a Frame) -> Self {
-        Self { color: Some(&frame.beauty), depth: frame.depth.as_deref(), channels: &frame.channels, air: None }
+    pub(crate) fn drawn(LightFrame { frame, drawn }: &'a LightFrame) -> Self {
+        let depth = frame.depth.as_deref();
+        Self { color: Some(&frame.beauty), drawn: drawn.as_ref(), depth, channels: &frame.channels, air: None }
     }
 
     /// The same background seen through air with this deflection.
@@ -84,7 +94,33 @@ impl<'a> Background<'a> {
     where
         'a: 'b,
     {
-        let image = self.color?;
+        Self::image_row(self.color?, rect, row, bent, buffer)
+    }
+
+    /// As [`color_row`](Self::color_row), without the light of the plate; `None` if it is not kept apart.
+    pub(crate) fn drawn_row<'b>(
+        &self,
+        rect: Rect,
+        row: usize,
+        bent: &BentPixels,
+        buffer: &'b mut Vec<[f32; 4]>,
+    ) -> Option<&'b [[f32; 4]]>
+    where
+        'a: 'b,
+    {
+        Self::image_row(self.drawn?, rect, row, bent, buffer)
+    }
+
+    fn image_row<'b>(
+        image: &'a Image<4>,
+        rect: Rect,
+        row: usize,
+        bent: &BentPixels,
+        buffer: &'b mut Vec<[f32; 4]>,
+    ) -> Option<&'b [[f32; 4]]>
+    where
+        'a: 'b,
+    {
         let y = rect.y + row;
         if bent.row(y).is_empty() {
             return Some(&image.row(y)[rect.x..rect.right()]);
@@ -327,7 +363,7 @@ mod tests {
             let mut bent = BentPixels::default();
             let color = Image::from_pixels(size[0], size[1], [1.0, 2.0, 4.0].map(|v| [v; 4]).to_vec()).unwrap();
             let air = Some(RefractingAir { deflection, focal_pixels: 1.0, is_periodic: false });
-            let background = Background { color: Some(&color), depth: None, channels: &[], air };
+            let background = Background { color: Some(&color), drawn: None, depth: None, channels: &[], air };
             background.trace(Rect::from_size(size[0], size[1]), &mut bent);
             let seen = background.plane(&[1.0, 2.0, 4.0], Rect::from_size(size[0], size[1]), &bent, size[0]);
             assert_eq!(seen, [1.5, 3.0, 4.0], "{size:?}");
@@ -340,7 +376,7 @@ mod tests {
         let deflection = Deflection { depth: 2.0, rect: Rect { x: 1, y: 1, width: 1, height: 1 }, angle: &angles };
         let color = Image::from_pixels(3, 2, (0..6_u8).map(|v| [f32::from(v); 4]).collect()).unwrap();
         let air = Some(RefractingAir { deflection, focal_pixels: 1.0, is_periodic: false });
-        let background = Background { color: Some(&color), depth: None, channels: &[], air };
+        let background = Background { color: Some(&color), drawn: None, depth: None, channels: &[], air };
         let (mut bent, mut buffer) = (BentPixels::default(), Vec::new());
         let rect = Rect { x: 0, y: 0, width: 3, height: 2 };
         background.trace(rect, &mut bent);

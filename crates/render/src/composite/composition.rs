@@ -37,13 +37,15 @@ pub(crate) struct Outputs {
     pub(crate) aovs: bool,
     /// Whether the depth of each pixel is needed.
     pub(crate) depth: bool,
+    /// Whether the light that is not the plate's is kept apart, if there is a plate.
+    pub(crate) plate_apart: bool,
 }
 
 impl Outputs {
     /// As the plan requests.
     pub(crate) fn of_plan(plan: &Plan) -> Self {
         let depth = plan.depth || plan.layers || plan.aovs;
-        Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs, depth }
+        Self { exposure: plan.exposure_scale(), layers: plan.layers, aovs: plan.aovs, depth, plate_apart: false }
     }
 
     /// Whether more than the color and the alpha of a display picture is needed of the frame.
@@ -57,7 +59,8 @@ impl Outputs {
     }
 
     /// Absolute radiance without layers and AOVs.
-    pub(crate) const RADIANCE: Self = Self { exposure: 1.0, layers: false, aovs: false, depth: false };
+    pub(crate) const RADIANCE: Self =
+        Self { exposure: 1.0, layers: false, aovs: false, depth: false, plate_apart: false };
 }
 
 /// A frame that is ready to be composited.

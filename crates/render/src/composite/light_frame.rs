@@ -7,6 +7,7 @@ use bansho_base::{
 };
 
 use super::{
+    background::LightFrame,
     composition::{Composition, STRIP_ROWS},
     strips::{StripLight, StripPixels, draw_strips},
 };
@@ -16,10 +17,14 @@ pub(crate) fn draw_frame(
     composition: &Composition,
     header: FrameHeader,
     recycled: Option<Frame>,
-) -> Result<Frame, Cancelled> {
-    let mut memory = FrameMemory::new(composition.view.window, composition.outputs.depth, recycled);
+) -> Result<LightFrame, Cancelled> {
+    let window = composition.view.window;
+    let mut memory = FrameMemory::new(window, composition.outputs.depth, recycled);
+    if composition.outputs.plate_apart {
+        memory.drawn = Some(Image::filled(window.width, window.height, [0.0; 4]));
+    }
     let channels = draw_strips(composition, memory.strips(STRIP_ROWS))?;
-    Ok(Frame {
+    let frame = Frame {
         header,
         beauty: memory.beauty,
         depth: memory.depth,
@@ -27,7 +32,8 @@ pub(crate) fn draw_frame(
         opaque: composition.is_opaque(),
         content: composition.content(),
         metadata: Vec::new(),
-    })
+    };
+    Ok(LightFrame { frame, drawn: memory.drawn })
 }
 
 /// The memory of a frame.
@@ -36,6 +42,8 @@ struct FrameMemory {
     beauty: Image<4>,
     /// Depth, m; `None` where nothing reads it.
     depth: Option<Vec<f32>>,
+    /// Color without that of the plate; `None` where it is not kept apart.
+    drawn: Option<Image<4>>,
     /// Pixels that still contain an earlier frame; all others are empty.
     stale: Rect,
 }
@@ -45,6 +53,8 @@ struct FrameStrip<'a> {
     beauty: &'a mut [[f32; 4]],
     /// Empty where the frame has no depth.
     depth: &'a mut [f32],
+    /// Empty where the light of the plate is not kept apart.
+    drawn: &'a mut [[f32; 4]],
     /// Pixels of the strip that still contain an earlier frame.
     stale: Rect,
     width: usize,
@@ -58,10 +68,10 @@ impl FrameMemory {
             && [beauty.width(), beauty.height()] == [width, height]
             && depth.is_some() == has_depth
         {
-            return Self { beauty, depth, stale: content };
+            return Self { beauty, depth, drawn: None, stale: content };
         }
         let depth = has_depth.then(|| vec![f32::INFINITY; width * height]);
-        Self { beauty: Image::filled(width, height, [0.0; 4]), depth, stale: Rect::default() }
+        Self { beauty: Image::filled(width, height, [0.0; 4]), depth, drawn: None, stale: Rect::default() }
     }
 
     /// Its strips of `strip_rows` rows from the top; the last one may have fewer.
@@ -69,13 +79,15 @@ impl FrameMemory {
         let (width, stale) = (self.beauty.width(), self.stale);
         let pixels = strip_rows * width;
         let mut depth = self.depth.iter_mut().flat_map(|depth| depth.chunks_mut(pixels));
+        let mut drawn = self.drawn.iter_mut().flat_map(|drawn| drawn.pixels_mut().chunks_mut(pixels));
         // In one allocation: live effects count them.
         let mut strips = Vec::with_capacity(self.beauty.height().div_ceil(strip_rows));
         for (index, beauty) in self.beauty.pixels_mut().chunks_mut(pixels).enumerate() {
             let rows = Rect { x: 0, y: index * strip_rows, width, height: strip_rows };
             let stale = stale.intersection(&rows);
             let stale = Rect { y: stale.y.saturating_sub(rows.y), ..stale };
-            strips.push(FrameStrip { beauty, depth: depth.next().unwrap_or_default(), stale, width });
+            let (depth, drawn) = (depth.next().unwrap_or_default(), drawn.next().unwrap_or_default());
+            strips.push(FrameStrip { beauty, depth, drawn, stale, width });
         }
         strips
     }
@@ -84,7 +96,7 @@ impl FrameMemory {
 impl StripPixels for FrameStrip<'_> {
     fn light<'a>(&'a mut self, strip: Rect, _drawn: Rect, _buffer: &'a mut Vec<[f32; 4]>) -> StripLight<'a> {
         self.clear();
-        StripLight { rect: strip, beauty: self.beauty, depth: self.depth }
+        StripLight { rect: strip, beauty: self.beauty, depth: self.depth, drawn: self.drawn }
     }
 
     fn convert(&mut self, _strip: Rect, _drawn: Rect, _buffer: &[[f32; 4]]) {}

@@ -4,6 +4,7 @@ mod accumulate;
 pub(crate) mod background;
 mod channels;
 pub(crate) mod composition;
+pub(crate) mod glare;
 pub(crate) mod hiding;
 pub(crate) mod light_frame;
 pub(crate) mod mirror;

@@ -9,14 +9,18 @@ use bansho_base::{
     phenomenon::Deflection,
 };
 
-use super::{background::Background, composition::Composition, light_frame};
+use super::{
+    background::{Background, LightFrame},
+    composition::Composition,
+    light_frame,
+};
 
 /// Draws and composites the whole window, with refraction.
 pub(crate) fn draw_frame(
     composition: &Composition,
     header: FrameHeader,
     mut recycled: Option<Frame>,
-) -> Result<Frame, Cancelled> {
+) -> Result<LightFrame, Cancelled> {
     let mut layers: Vec<Deflection> =
         composition.prepared.iter().filter_map(|prepared| prepared.deflection()).collect();
     layers.sort_by(|a, b| b.depth.total_cmp(&a.depth));

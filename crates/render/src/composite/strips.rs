@@ -1,5 +1,7 @@
 //! From prepared phenomena to pixels: each strip composites its slices from near to far, then adds the background.
 
+use std::ops::Range;
+
 use bansho_base::{
     frame::Channel,
     host::{
@@ -12,6 +14,7 @@ use bansho_base::{
 use fearless_simd::{Level, dispatch};
 
 use super::{
+    accumulate::Accumulator,
     channels::{channel_planes, channels},
     composition::{Composition, StripScratch},
 };
@@ -34,6 +37,8 @@ pub(crate) struct StripLight<'a> {
     pub(crate) beauty: &'a mut [[f32; 4]],
     /// Depth, m; empty if it is not kept.
     pub(crate) depth: &'a mut [f32],
+    /// Color without that of the plate; empty if it is not kept apart.
+    pub(crate) drawn: &'a mut [[f32; 4]],
 }
 
 /// Draws and composites the whole window into its strips of [`STRIP_ROWS`](super::composition::STRIP_ROWS) rows from the top. Each is converted while its light is in the cache. Returns the
@@ -101,14 +106,14 @@ fn finish_strip(composition: &Composition, level: Level, scratch: &mut StripScra
                 dispatch!(level, _simd => expose_absorbed_row(exposure, color, transmittance, out));
             }
         }
-        if let Some(colors) = background.color_row(rect, row, bent, buffer) {
-            match accumulator.transmittance() {
-                None => dispatch!(level, _simd => composite_background(colors, out)),
-                Some(planes) => {
-                    let transmittance = planes.each_ref().map(|plane| &plane[accumulated.clone()]);
-                    dispatch!(level, _simd => composite_absorbed_background(transmittance, colors, out));
-                }
+        if let Some(drawn) = pixels.drawn.get_mut(first..first + rect.width) {
+            drawn.copy_from_slice(out);
+            if let Some(colors) = background.drawn_row(rect, row, bent, buffer) {
+                add_background(accumulator, accumulated.clone(), level, colors, drawn);
             }
+        }
+        if let Some(colors) = background.color_row(rect, row, bent, buffer) {
+            add_background(accumulator, accumulated.clone(), level, colors, out);
         }
         if let Some(hidden) = accumulator.hidden_alpha(accumulated.clone()) {
             out.iter_mut().zip(hidden).for_each(|(out, alpha)| out[3] += alpha);
@@ -118,6 +123,23 @@ fn finish_strip(composition: &Composition, level: Level, scratch: &mut StripScra
             if let Some(depths) = background.depth_row(rect, row, composition.view.size[0]) {
                 depth.iter_mut().zip(depths).for_each(|(depth, farther)| *depth = depth.min(*farther));
             }
+        }
+    }
+}
+
+/// Composites a row of the background behind `out`, the pixels `accumulated` of the accumulator.
+fn add_background(
+    accumulator: &Accumulator,
+    accumulated: Range<usize>,
+    level: Level,
+    background: &[[f32; 4]],
+    out: &mut [[f32; 4]],
+) {
+    match accumulator.transmittance() {
+        None => dispatch!(level, _simd => composite_background(background, out)),
+        Some(planes) => {
+            let transmittance = planes.each_ref().map(|plane| &plane[accumulated.clone()]);
+            dispatch!(level, _simd => composite_absorbed_background(transmittance, background, out));
         }
     }
 }

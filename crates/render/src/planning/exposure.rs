@@ -11,9 +11,6 @@ use bansho_base::{
 use crate::{compiled::CompiledScene, plan::Plan};
 use bansho_scene::Scene;
 
-/// Luminance of the bright regions of a phenomenon at automatic exposure, relative to display white: high enough that a core is nearly white,
-/// low enough that its edges keep their color.
-const HEADROOM: f64 = 1.7;
 /// Luminance of surfaces and air that lamps light, relative to display white, below which all but [`BRIGHTEST_FRACTION`] of it must stay: a
 /// lit street at night is not white.
 const LIT_LEVEL: f64 = 0.3;
@@ -41,8 +38,8 @@ pub(crate) fn choose(compiled: &CompiledScene, plan: &Plan) -> f32 {
     match plan.scene.picture.exposure_ev100 {
         Auto::Set(ev100) => ev100 as f32,
         Auto::Auto => of_plate(compiled).unwrap_or_else(|| {
-            let brightest = compiled.phenomena().map(|phenomenon| phenomenon.luminance()).fold(0.0, f64::max);
-            automatic(plan, brightest)
+            let whites = compiled.phenomena().map(|phenomenon| phenomenon.luminance() / phenomenon.exposed_luminance());
+            automatic(plan, whites.fold(0.0, f64::max))
         }) as f32,
     }
 }
@@ -62,18 +59,18 @@ fn of_plate(compiled: &CompiledScene) -> Option<f64> {
     }
 }
 
-/// The exposure value for phenomena whose bright regions have a luminance of `brightest` cd/m^2.
+/// The exposure value for phenomena that need a luminance of `white_of_phenomena` as display white, cd/m^2.
 ///
 /// Over a plate of unknown exposure, it is a guess at the plate's exposure: the one that suits what shines and makes a `[sky]` nearly white;
 /// without either, that of an overcast day.
-fn automatic(plan: &Plan, brightest: f64) -> f64 {
+fn automatic(plan: &Plan, white_of_phenomena: f64) -> f64 {
     let scene = plan.scene();
     let (other_white, default_ev100) = if scene.has_plate() {
         (stated_sky(scene) / SKY_LEVEL, OVERCAST_EV100)
     } else {
         (lit_luminance(plan) / LIT_LEVEL, SUNLIT_EV100)
     };
-    let white = (brightest / HEADROOM).max(other_white);
+    let white = white_of_phenomena.max(other_white);
     if white > 0.0 { ev100_of_white_luminance(white) } else { default_ev100 }
 }
 

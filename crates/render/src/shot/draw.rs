@@ -15,11 +15,12 @@ use crate::{
     composite::{
         background::Background,
         composition::{Composition, Outputs},
+        glare::{self, PointSpread},
         hiding::HidingDepth,
         plate::PlateFrame,
     },
     context::ShotContext,
-    target::{Drawing, SceneLinear, Target},
+    target::{Drawing, SceneLinear, Target, WithoutGlare},
 };
 
 impl Shot {
@@ -46,17 +47,48 @@ impl Shot {
         };
         drop(preparing);
         let pictures = FramePictures { plate: &plate, mirrored: &mirrored, publications: &publications };
+        if let Some(spread) = PointSpread::new(self.context.plan.glare, view.camera.focal_pixels) {
+            let light = self.draw_with_glare(&view, &spread, pictures, observer)?;
+            let _stage = StageGuard::begin(observer, Stage::View);
+            return Ok(target.of_light(light, &mut self.recycled));
+        }
         let mut recycled = self.recycled.take();
         let drawn = self.draw_view(&view, pictures, target, &mut recycled, observer);
         self.recycled = recycled;
         if let Some(frame) = drawn? {
             return Ok(frame);
         }
-        let [width, height] = view.size;
-        let whole = view.with_window(Rect::from_size(width, height));
-        let whole = self.draw_view(&whole, pictures, &SceneLinear, &mut None, observer)?.ok_or(Cancelled)?;
-        let window = crop(whole, self.context.plan.window).ok_or(Cancelled)?;
+        let whole = self.draw_view(&view.with_whole_window(), pictures, &SceneLinear, &mut None, observer)?;
+        let window = crop(whole.ok_or(Cancelled)?, self.context.plan.window).ok_or(Cancelled)?;
         Ok(target.of_light(window, &mut None))
+    }
+
+    /// Draws the light of the view with the glare of the camera. It comes from around the view's window too.
+    fn draw_with_glare(
+        &mut self,
+        view: &View,
+        spread: &PointSpread,
+        pictures: FramePictures,
+        observer: &dyn Observer,
+    ) -> Result<Frame, RenderError> {
+        let mut drawn_view = glare::source_view(spread, view);
+        let mut recycled = self.recycled.take();
+        let drawn = self.draw_view(&drawn_view, pictures, &WithoutGlare, &mut recycled, observer)?;
+        let mut light = match drawn {
+            Some(light) => light,
+            None => {
+                drawn_view = view.with_whole_window();
+                self.draw_view(&drawn_view, pictures, &WithoutGlare, &mut None, observer)?.ok_or(Cancelled)?
+            }
+        };
+        let _stage = StageGuard::begin(observer, Stage::Draw);
+        glare::add(&mut light, spread, &drawn_view, self.context.plan.layers, &mut self.pyramid);
+        if drawn_view.window == view.window {
+            return Ok(light.frame);
+        }
+        let [left, top] = [drawn_view.window.x, drawn_view.window.y];
+        let window = Rect { x: view.window.x - left, y: view.window.y - top, ..view.window };
+        Ok(crop(light.frame, window).ok_or(Cancelled)?)
     }
 
     /// Draws the view. `None` if its window is not the whole picture and light is refracted: it may come from outside the window, so the whole
@@ -94,7 +126,11 @@ impl Shot {
         let through = HidingDepth::through(&prepared, plate, view.size);
         let composition = Composition {
             // What is nearer than refracting air is not refracted.
-            outputs: Outputs { depth: outputs.depth || is_refracted, ..outputs },
+            outputs: Outputs {
+                depth: outputs.depth || is_refracted,
+                plate_apart: self.context.plan.glare > 0.0 && plate.color.is_some(),
+                ..outputs
+            },
             is_mirrored: false,
             observer,
             view,

@@ -30,6 +30,7 @@ use crate::{
     compiled::{ActiveRun, CompiledScene},
     composite::{
         composition::{self, StripScratches},
+        glare::Pyramid,
         mirror::Mirror,
         moving_members::{Moments, MovingMember},
         plate_cache::PlateCache,
@@ -74,6 +75,8 @@ pub struct Shot {
     has_earlier_state: bool,
     /// A frame whose memory the next one reuses.
     recycled: Option<Frame>,
+    /// Memory for the glare of frames.
+    pyramid: Pyramid,
     scratches: StripScratches,
 }
 
@@ -88,8 +91,16 @@ impl Shot {
             plates: PlateCache::default(),
             has_earlier_state: false,
             recycled: None,
+            pyramid: Pyramid::default(),
             scratches: composition::scratches(),
         }
+    }
+
+    /// Another shot of the same scene and plan, which draws the same frames at the same time as this one. `None` where frames follow from those before: where the
+    /// scene is simulated in steps, or its wind was changed.
+    pub fn independent(&self) -> Option<Self> {
+        let is_closed_form = self.runs.iter().all(|run| run.stepping.is_none()) && self.context.wind.is_planned();
+        is_closed_form.then(|| Self::open(self.context.compiled.clone(), self.context.plan.clone()))
     }
 
     /// Steps all simulations to frame `number`; restarts them if they are past it.

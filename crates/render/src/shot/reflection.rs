@@ -110,6 +110,6 @@ impl Shot {
             scratches: &self.scratches,
         };
         let header = self.context.header(self.number, self.time);
-        Ok(light_frame::draw_frame(&composition, header, None)?.beauty)
+        Ok(light_frame::draw_frame(&composition, header, None)?.frame.beauty)
     }
 }

@@ -11,6 +11,9 @@ use bansho_base::{
 /// Name of the layer of the plate.
 pub const PLATE_LAYER: &str = "plate";
 
+/// Name of the layer of the camera's glare.
+pub const GLARE_LAYER: &str = "glare";
+
 /// `[picture]`.
 pub const PICTURE: TableKind = TableKind {
     first_keys: &["size", "frames", "fps"],
@@ -20,6 +23,7 @@ pub const PICTURE: TableKind = TableKind {
 /// `[camera]`.
 pub const CAMERA: TableKind = TableKind {
     first_keys: &["position", "target", "vertical_fov_deg"],
+    layer: Some(GLARE_LAYER),
     ..TableKind::field("camera", TableCount::One, CameraParameters::table)
 };
 

@@ -1,7 +1,7 @@
 //! The tables `[picture]` and `[plate]`.
 
 use bansho_base::{
-    color::MAX_EV100,
+    color::{MAX_EV100, ViewName},
     parameters::{AssetPath, Auto, Kind, Length, Node, Parameter, ProblemKind, Range, Reader, Value},
 };
 
@@ -119,6 +119,9 @@ bansho_base::parameters! {
         fps: FrameRate = FrameRate { frames: 30, seconds: 1 }, unit("1/s");
         /// Exposure value at ISO 100, or "auto": that of the plate; without a plate, measured once for the shot from the luminance of the scene.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-40.0, 40.0)), unit("EV");
+        /// View transform of display formats, where the program's user chooses none. A plate that is made for display goes through its inverse, so that its
+        /// pixels return unchanged.
+        view: ViewName = ViewName::Display;
         /// White balance: temperature of the black body whose light is displayed as white, such as 4000 for a night sky. It only changes display
         /// formats; EXR files contain the unbalanced light, and state the white in their header. The default is 4000 for a night sky, else the
         /// white of the display, D65.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bansho::{
-    Assets, CompiledScene, KINDS, Plan, PlanOptions, SceneError, SceneOptions,
+    Assets, CompiledScene, GlareUse, KINDS, Plan, PlanOptions, SceneError, SceneOptions,
     base::{
         host::assets::{AssetError, AssetProblem},
         parameters::{Problem, ProblemKind, Span, Table, Value},
@@ -50,6 +50,11 @@ pub struct Checker {
     last_draft: Option<Arc<CompiledScene>>,
 }
 
+/// Pictures of the studio look like those that `bansho render` writes for display.
+fn plan_options() -> PlanOptions {
+    PlanOptions { glare: GlareUse::Always, ..PlanOptions::default() }
+}
+
 impl Checker {
     /// Builds and plans the scene `text`.
     ///
@@ -57,7 +62,7 @@ impl Checker {
     /// All problems of the text and of the assets that it names.
     pub fn check(&mut self, name: &str, text: &str, assets: &Arc<dyn Assets>) -> Result<PlannedScene, SceneError> {
         let compiled = build(name, text, assets, &mut self.last_scene)?;
-        let plan = Plan::new(&compiled, &PlanOptions::default());
+        let plan = Plan::new(&compiled, &plan_options());
         let plan = plan.map(Arc::new).map_err(|error| error_without_span(name, text, error.to_string()))?;
         Ok(PlannedScene { compiled, plan })
     }
@@ -81,7 +86,7 @@ impl Checker {
             // With the exposure of the full scene, so that fewer particles do not look brighter.
             let plan = Plan::with_exposure_and_loop_start(
                 compiled.scene().clone(),
-                &PlanOptions::default(),
+                &plan_options(),
                 full.plan.exposure_ev100,
                 0,
             );
@@ -151,7 +156,7 @@ pub fn plan_from_report(name: &str, text: &str, report: CheckReport) -> Result<A
     let scene = parse(name, text)?;
     match report {
         Ok(ev100) => {
-            let plan = Plan::with_exposure_and_loop_start(scene, &PlanOptions::default(), ev100, 0);
+            let plan = Plan::with_exposure_and_loop_start(scene, &plan_options(), ev100, 0);
             plan.map(Arc::new).map_err(|error| error_without_span(name, text, error.to_string()))
         }
         Err(problems) => {

@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use bansho::{
-    AlphaConvention, Assets, BitDepth, DisplayFrame, DisplayImage, DisplayOptions, Observer, RenderError, Shot, View,
+    Assets, DisplayFrame, DisplayImage, DisplayOptions, Observer, Plan, RenderError, Shot,
     base::frame::DisplayPixels,
     media::{
         MediaError,
@@ -142,7 +142,7 @@ impl Engine {
             None => (scene.clone(), Shot::open(scene.compiled.clone(), scene.plan.clone())),
         });
         shot.advance(number, observer)?;
-        Ok(encode_png(&shot.draw(&STILL, observer)?)?)
+        Ok(encode_png(&shot.draw(&still(&scene.plan), observer)?)?)
     }
 
     fn draw(
@@ -173,7 +173,8 @@ impl OpenShot {
         shot.advance(number, observer)?;
         snapshots.iter_mut().for_each(|snapshots| snapshots.store(&scene.compiled, shot, number));
         let advanced = Instant::now();
-        let pixels = eight_bits(shot.draw(&PREVIEW, observer)?.image);
+        let preview = DisplayOptions { over_black: true, ..still(&scene.plan) };
+        let pixels = eight_bits(shot.draw(&preview, observer)?.image);
         Ok(Picture {
             revision: request.revision,
             number,
@@ -249,11 +250,9 @@ fn fit_within(size: [usize; 2], within: [usize; 2]) -> [usize; 2] {
 }
 
 /// A still as `bansho render` draws it for a PNG by default.
-const STILL: DisplayOptions =
-    DisplayOptions { view: View::DISPLAY, depth: BitDepth::Eight, alpha: AlphaConvention::Encoded, over_black: false };
-
-/// A picture of the preview.
-const PREVIEW: DisplayOptions = DisplayOptions { over_black: true, ..STILL };
+fn still(plan: &Plan) -> DisplayOptions {
+    DisplayOptions { view: plan.display, ..DisplayOptions::default() }
+}
 
 /// The pixels of a picture with 8 bits.
 fn eight_bits(image: DisplayImage) -> Vec<[u8; 4]> {
@@ -265,7 +264,8 @@ fn eight_bits(image: DisplayImage) -> Vec<[u8; 4]> {
 
 /// The frame as a PNG with the default options of `bansho render`.
 fn encode_png(frame: &DisplayFrame) -> Result<Vec<u8>, MediaError> {
-    let fingerprint = fingerprint::of_png(frame.header.fingerprint, STILL.depth, STILL.alpha);
+    let DisplayOptions { depth, alpha, .. } = DisplayOptions::default();
+    let fingerprint = fingerprint::of_png(frame.header.fingerprint, depth, alpha);
     png::encode(&frame.image, &fingerprint, PngEffort::default(), Path::new("still.png"))
 }
 
@@ -277,8 +277,9 @@ mod tests {
     fn a_picture_too_large_for_a_png_is_an_error() {
         let assets: Arc<dyn Assets> = Arc::new(bansho::MemoryAssets::default());
         let scene = crate::document::check("scene", "bansho = 2\n[picture]\nsize = [8, 4]\n", &assets).unwrap();
+        let options = still(&scene.plan);
         let mut shot = Shot::open(scene.compiled, scene.plan);
-        let mut frame = shot.draw(&STILL, &bansho::Unobserved).unwrap();
+        let mut frame = shot.draw(&options, &bansho::Unobserved).unwrap();
         assert!(encode_png(&frame).unwrap().starts_with(b"\x89PNG"));
         let [width, height] = [png::SIDE_LIMIT + 1, 1];
         frame.image = DisplayImage { width, height, pixels: DisplayPixels::Eight(vec![[0; 4]; width]), ..frame.image };

@@ -7,7 +7,7 @@ use bansho_base::{
     parameters::ProblemKind,
     phenomenon::SharedMemory,
 };
-use bansho_render::{CompiledScene, Plan, display::BitDepth, moment_bytes_per_thread};
+use bansho_render::{CompiledScene, Plan, display::BitDepth, moment_bytes_per_thread, source_window};
 
 use crate::job::{
     error::{JobError, OptionError},
@@ -60,7 +60,8 @@ impl BytesPerPixel {
         let refracts = refracts(compiled, plan);
         let depth = if request.display.is_none() || refracts { DEPTH_BYTES } else { 0.0 };
         // Where only display pixels are kept, there is no light of a whole picture.
-        let has_light = request.display.is_none() || request.tiles > 0 || refracts;
+        let has_glare = plan.glare > 0.0;
+        let has_light = request.display.is_none() || request.tiles > 0 || refracts || has_glare;
         let frame = if has_light { FRAME_BYTES + depth + 4.0 * channels as f64 } else { 0.0 };
         // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
         let [display, file] = match request.display {
@@ -81,6 +82,10 @@ impl BytesPerPixel {
         let drawn = drawn as f64 * frame + encoded as f64 * written;
         let plate_depth = if plan.scene().plate.depth.is_some() { DEPTH_BYTES } else { 0.0 };
         let plate = if has_plate { FRAME_BYTES + plate_depth } else { 0.0 };
+        // The pyramid, and the light without that of the plate.
+        let plate_apart = if has_plate { FRAME_BYTES } else { 0.0 };
+        let glare = if has_glare { FRAME_BYTES / 3.0 + plate_apart } else { 0.0 };
+        let drawn = drawn + glare;
         Self { drawn, whole: plate + reflected(compiled, plan, plate) }
     }
 
@@ -106,7 +111,7 @@ fn reflected(compiled: &CompiledScene, plan: &Plan, plate: f64) -> f64 {
 /// Memory of a job, bytes: what its pictures take, its phenomena, the file of its plate, and the process. Within a quarter of the measured peak for frames
 /// that take longer to draw than to write.
 pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest) -> f64 {
-    let window = plan.window();
+    let window = source_window(plan);
     let (drawn, whole) =
         (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));

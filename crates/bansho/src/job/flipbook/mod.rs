@@ -63,8 +63,8 @@ pub struct Flipbook {
     pub seed: Option<u64>,
     /// Makes a seamless loop of this length, s. The sheet then contains exactly one pass through it, at the frame rate that follows from this.
     pub loop_s: Option<f64>,
-    /// The view transform of PNG sheets.
-    pub view: View,
+    /// The view transform of PNG sheets; `None` for that of the scene.
+    pub view: Option<View>,
     /// Bits of each channel of PNG sheets, except motion, which always has 16.
     pub bits: BitDepth,
     /// Convention of the straight alpha of PNG sheets. `None` is [`AlphaConvention::Linear`], since engines blend sprites in linear light.
@@ -100,7 +100,7 @@ impl Flipbook {
             first_frame: None,
             seed: None,
             loop_s: None,
-            view: View::DISPLAY,
+            view: None,
             bits: BitDepth::Eight,
             alpha: None,
             gltf: false,
@@ -138,7 +138,7 @@ impl Flipbook {
         let request = MemoryRequest { frames, tiles: frames, display: Some(self.bits), size_is_option: true };
         memory::check(&self.scene, &compiled, &plan, request)?;
         let overwrite = OverwritePolicy::new(outputs::input_files(&self.scene, &plan, &numbers), self.overwrite);
-        let files = self.files(overwrite)?;
+        let files = self.files(plan.display, overwrite)?;
         files.paths().iter().try_for_each(|path| outputs::check_writable(path))?;
         outputs::check_overwriting(&files.overwrite, files.paths())?;
         let memory_bytes = memory::estimated_bytes(&compiled, &plan, request);
@@ -151,7 +151,7 @@ impl Flipbook {
     /// # Errors
     /// The output is not the name of a picture.
     pub fn paths(&self) -> Result<Vec<PathBuf>, JobError> {
-        Ok(self.files(OverwritePolicy::default())?.paths())
+        Ok(self.files(self.view.unwrap_or_default(), OverwritePolicy::default())?.paths())
     }
 
     /// Size of a tile: that of the options, or the scene's, reduced until the sheet is no larger than [`DEFAULT_SHEET_SIDE`].
@@ -164,7 +164,7 @@ impl Flipbook {
         })
     }
 
-    fn files(&self, overwrite: OverwritePolicy) -> Result<Files, JobError> {
+    fn files(&self, view: View, overwrite: OverwritePolicy) -> Result<Files, JobError> {
         let stem = &self.scene.stem;
         let path = match &self.out {
             Some(path) => path.clone(),
@@ -178,9 +178,9 @@ impl Flipbook {
         if !is_picture || pattern.is_numbered() {
             return Err(OptionError::SheetFormat { path, allowed: "NAME.png or NAME.exr" }.into());
         }
-        let alpha = prepare::alpha_convention(self.alpha, self.view, AlphaConvention::Linear)?;
+        let alpha = prepare::alpha_convention(self.alpha, view, AlphaConvention::Linear)?;
         let base = pattern.path(0).with_extension("");
-        let (kind, view, bits, gltf) = (pattern.kind(), self.view, self.bits, self.gltf);
+        let (kind, bits, gltf) = (pattern.kind(), self.bits, self.gltf);
         Ok(Files { base, kind, view, bits, alpha, gltf, overwrite })
     }
 }

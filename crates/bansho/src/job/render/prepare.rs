@@ -20,7 +20,7 @@ use bansho_media::{
     imageops::sprite_sheet::SheetLayout,
     output::sink::Sink,
 };
-use bansho_render::{CompiledScene, Plan, PlanOptions, display::BitDepth};
+use bansho_render::{CompiledScene, GlareUse, Plan, PlanOptions, display::BitDepth};
 use bansho_scene::{Positions, SceneOptions, picture};
 
 use super::{
@@ -175,10 +175,11 @@ impl Job {
         let kind = self.output_kind()?;
         self.check_channels(kind)?;
         self.check_metadata(kind)?;
-        check_view(self.view, kind, &self.output_path())?;
-        let alpha = alpha_convention(self.alpha, self.view, AlphaConvention::Encoded)?;
+        let view = self.view.unwrap_or_else(|| scene.picture.view.into());
+        check_view(view, kind, &self.output_path())?;
+        let alpha = alpha_convention(self.alpha, view, AlphaConvention::Encoded)?;
         let compiled = self.scene.compile(scene.with_options(&self.scene_options())?, &self.scene.assets())?;
-        let mut plan = Plan::new(&compiled, &self.plan_options(kind))?;
+        let mut plan = Plan::new(&compiled, &self.plan_options(kind, view))?;
         plan.depth = kind.is_scene_linear();
         let plan = Arc::new(plan);
         let frames = self.selected_frames(&plan)?;
@@ -199,7 +200,7 @@ impl Job {
         let snapshots = snapshots.prepare(&compiled, &plan, &overwrite)?;
         let mut prepared = PreparedJob {
             scene: self.scene.clone(),
-            format: Format { pattern, view: self.view, bits: self.bits, alpha, metadata: self.metadata, overwrite },
+            format: Format { pattern, view, bits: self.bits, alpha, metadata: self.metadata, overwrite },
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             warnings: Vec::new(),
             memory_bytes: memory::estimated_bytes(&compiled, &plan, memory_request),
@@ -275,7 +276,7 @@ impl Job {
         SceneOptions { seed: self.seed, loop_s: self.loop_s, implied_backdrop: !self.transparent }
     }
 
-    fn plan_options(&self, kind: OutputKind) -> PlanOptions {
+    fn plan_options(&self, kind: OutputKind, view: View) -> PlanOptions {
         PlanOptions {
             size: self.size,
             overscan: kind.is_scene_linear(),
@@ -283,7 +284,18 @@ impl Job {
             layers: self.layers,
             aovs: self.aovs,
             metadata: self.metadata,
-            display: self.view,
+            glare: self.glare_use(kind, view),
+            display: Some(view),
+        }
+    }
+
+    /// Pictures and films for display have the glare of the camera, scene-linear files have it if this is requested.
+    fn glare_use(&self, kind: OutputKind, view: View) -> GlareUse {
+        match kind.is_scene_linear() {
+            true if self.scene_linear_glare => GlareUse::Always,
+            true => GlareUse::Never,
+            false if view == View::RAW => GlareUse::Stated,
+            false => GlareUse::Always,
         }
     }
 
@@ -326,7 +338,10 @@ impl Job {
             warnings.push(Warning::AlphaUnused);
         }
         // With a plate, the view also affects EXR: the inverse view is applied to the plate.
-        if kind.is_scene_linear() && self.view != View::DISPLAY && !job.plan.scene().has_plate() {
+        if kind.is_scene_linear()
+            && self.view.is_some_and(|view| view != View::DISPLAY)
+            && !job.plan.scene().has_plate()
+        {
             warnings.push(Warning::ViewUnused);
         }
         if self.resume && !job.resume {

@@ -2,6 +2,7 @@
 
 pub(crate) mod agx;
 pub mod alpha;
+pub(crate) mod camera_response;
 pub mod gamut;
 pub mod quantize;
 pub(crate) mod row;

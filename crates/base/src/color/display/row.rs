@@ -34,7 +34,7 @@ pub(super) trait DisplayTransform {
     fn acescg_from_display(&self, display: [f32; 3]) -> [f32; 3];
 }
 
-/// The largest component by a tone curve, with saturation and hue of the view `display`.
+/// The largest component by a tone curve, with saturation and hue of the view `neutral`.
 impl DisplayTransform for ToneCurve {
     #[inline(always)]
     fn display_from_acescg(&self, acescg: [f32; 3]) -> [f32; 3] {

@@ -5,6 +5,7 @@ use fearless_simd::{Level, dispatch};
 use super::{
     agx::Agx,
     alpha::{AlphaConvention, AlphaMode},
+    camera_response::CameraResponse,
     gamut::sanitized,
     quantize::DisplayCode,
     row::{self, Clamped, DisplayTransform},
@@ -12,42 +13,47 @@ use super::{
 };
 use crate::color::white_balance::WhiteBalance;
 
-/// Scene brightness up to which the default view is the identity.
+/// Scene brightness up to which the view `neutral` is the identity.
 const KNEE: f32 = 0.6;
-/// Scene brightness that the default view shows as full display light.
+/// Scene brightness that the view `neutral` shows as full display light.
 const WHITE: f32 = 16.0;
 /// Pixels that are white-balanced at a time.
 const BALANCE_CHUNK: usize = 256;
 
-/// The transform of exposed scene light for display.
-///
-/// - `display`: for viewing. Identity for colors inside sRGB below 0.6, a shoulder up to 16, highlights desaturate toward white, hue is preserved
-///   except in warm highlights, which shift toward yellow ([`gamut`](super::gamut)).
-/// - `agx`: AgX as in Blender 4 and three.js: a film-like sigmoid on each channel, in which bright colors become pale.
-/// - `standard`: identity inside sRGB up to 1.0; only values beyond are changed, by the same desaturation.
-/// - `raw`: ACEScg values clamped to 0..=1, without encoding.
+crate::choice! {
+    /// A transform of exposed scene light for display.
+    pub enum ViewName {
+        /// As a camera shows the scene: on each channel a response with a toe and a shoulder that ends at 8 times display white, and 8 % of crosstalk
+        /// between the channels.
+        Display = "display",
+        /// For colors that must stay as they are: the identity for colors inside sRGB below 0.6, a shoulder up to 16. Highlights desaturate toward white, and
+        /// hue is preserved except in warm highlights, which shift toward yellow.
+        Neutral = "neutral",
+        /// AgX as in Blender 4 and three.js: a film-like sigmoid on each channel, in which bright colors become pale.
+        Agx = "agx",
+        /// The identity inside sRGB up to 1.0. Only values beyond are changed, by the desaturation of `neutral`.
+        Standard = "standard",
+        /// ACEScg values clamped to 0 to 1, without encoding.
+        Raw = "raw",
+    }
+}
+
+/// A transform of exposed scene light for display, with the white balance of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     transform: Transform,
     /// White balance, applied first; `None` for `raw`.
     balance: Option<WhiteBalance>,
-    name: &'static str,
+    name: ViewName,
 }
 
 /// The transform of a view, after its white balance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Transform {
+    CameraResponse,
     ToneMapped(ToneCurve),
     Agx,
     Raw,
-}
-
-/// Error: there is no view of that name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no view `{name}` (allowed: display, agx, standard, raw)")]
-pub struct UnknownView {
-    /// The requested name.
-    pub name: String,
 }
 
 impl Default for View {
@@ -56,34 +62,34 @@ impl Default for View {
     }
 }
 
+impl From<ViewName> for View {
+    fn from(name: ViewName) -> Self {
+        match name {
+            ViewName::Display => Self::DISPLAY,
+            ViewName::Neutral => Self::NEUTRAL,
+            ViewName::Agx => Self::AGX,
+            ViewName::Standard => Self::STANDARD,
+            ViewName::Raw => Self::RAW,
+        }
+    }
+}
+
 impl View {
-    /// The default: tone curve, desaturated highlights, gamut mapping, sRGB encoding.
-    pub const DISPLAY: Self = Self {
+    /// The default: the response of a camera (`camera_response`), sRGB encoding.
+    pub const DISPLAY: Self = Self { transform: Transform::CameraResponse, balance: None, name: ViewName::Display };
+    /// Tone curve, desaturated highlights, gamut mapping ([`gamut`](super::gamut)), sRGB encoding.
+    pub const NEUTRAL: Self = Self {
         transform: Transform::ToneMapped(ToneCurve::with_shoulder(KNEE, WHITE)),
         balance: None,
-        name: "display",
+        name: ViewName::Neutral,
     };
     /// AgX, as Blender 4 and three.js show light by default.
-    pub const AGX: Self = Self { transform: Transform::Agx, balance: None, name: "agx" };
+    pub const AGX: Self = Self { transform: Transform::Agx, balance: None, name: ViewName::Agx };
     /// No tone curve: gamut mapping and sRGB encoding.
     pub const STANDARD: Self =
-        Self { transform: Transform::ToneMapped(ToneCurve::clip()), balance: None, name: "standard" };
+        Self { transform: Transform::ToneMapped(ToneCurve::clip()), balance: None, name: ViewName::Standard };
     /// Linear ACEScg, clamped.
-    pub const RAW: Self = Self { transform: Transform::Raw, balance: None, name: "raw" };
-
-    /// The names of all views, default first.
-    pub const NAMES: [&'static str; 4] = [Self::DISPLAY.name, Self::AGX.name, Self::STANDARD.name, Self::RAW.name];
-
-    /// The view called `name`.
-    ///
-    /// # Errors
-    /// There is no view of that name; the message lists all names.
-    pub fn from_name(name: &str) -> Result<Self, UnknownView> {
-        [Self::DISPLAY, Self::AGX, Self::STANDARD, Self::RAW]
-            .into_iter()
-            .find(|view| view.name == name)
-            .ok_or_else(|| UnknownView { name: name.to_owned() })
-    }
+    pub const RAW: Self = Self { transform: Transform::Raw, balance: None, name: ViewName::Raw };
 
     /// The same view with the camera's white balance set to the light of a black body of that temperature, K; `None` is D65. `raw` ignores white
     /// balance.
@@ -101,7 +107,7 @@ impl View {
 
     /// The view's name.
     #[must_use]
-    pub const fn name(&self) -> &'static str {
+    pub fn name(&self) -> ViewName {
         self.name
     }
 
@@ -114,6 +120,7 @@ impl View {
             None => acescg,
         };
         match &self.transform {
+            Transform::CameraResponse => CameraResponse.display_from_acescg(balanced),
             Transform::ToneMapped(tone) => tone.display_from_acescg(balanced),
             Transform::Agx => Agx.display_from_acescg(balanced),
             Transform::Raw => Clamped.display_from_acescg(balanced),
@@ -127,6 +134,7 @@ impl View {
     #[must_use]
     pub fn to_scene(&self, display: [f32; 3]) -> [f32; 3] {
         let balanced = match &self.transform {
+            Transform::CameraResponse => CameraResponse.acescg_from_display(display),
             Transform::ToneMapped(tone) => tone.acescg_from_display(display),
             Transform::Agx => Agx.acescg_from_display(display),
             Transform::Raw => Clamped.acescg_from_display(display),
@@ -140,6 +148,7 @@ impl View {
     /// [`to_scene`](Self::to_scene) for many pixels in place: linear sRGB in, exposed ACEScg out; the fourth component is unchanged.
     pub fn to_scene_row(&self, level: Level, pixels: &mut [[f32; 4]]) {
         match &self.transform {
+            Transform::CameraResponse => dispatch!(level, _simd => row::to_scene(&CameraResponse, pixels)),
             Transform::ToneMapped(tone) => dispatch!(level, _simd => row::to_scene(tone, pixels)),
             Transform::Agx => dispatch!(level, _simd => row::to_scene(&Agx, pixels)),
             Transform::Raw => dispatch!(level, _simd => row::to_scene(&Clamped, pixels)),
@@ -208,6 +217,9 @@ impl View {
         // Coordinates are only used by the dither, which repeats after 2^32 pixels.
         let position = row::PixelPosition { x: x0 as u32, y: y as u32 };
         match &self.transform {
+            Transform::CameraResponse => {
+                dispatch!(level, _simd => row::encode_row::<C, _>(&CameraResponse, pixels, position, alpha, out));
+            }
             Transform::ToneMapped(tone) => {
                 dispatch!(level, _simd => row::encode_row::<C, _>(tone, pixels, position, alpha, out));
             }
@@ -237,6 +249,11 @@ mod tests {
         Some(AlphaMode::Premultiplied(AlphaConvention::Encoded)),
     ];
 
+    fn all_views() -> impl Iterator<Item = View> {
+        let names = ViewName::CHOICES.iter().filter_map(|choice| ViewName::from_name(choice.name));
+        names.map(View::from)
+    }
+
     /// Well spread 32-bit numbers, for pictures without structure.
     fn scattered(index: u32) -> u32 {
         let mixed = (index ^ (index >> 16)).wrapping_mul(0x7FEB_352D);
@@ -260,12 +277,14 @@ mod tests {
 
     #[test]
     fn cube_survives_the_way_to_the_scene_and_back() {
-        for view in [View::DISPLAY, View::AGX, View::STANDARD, View::DISPLAY.with_white_balance(Some(4000.0))] {
+        for view in
+            [View::DISPLAY, View::NEUTRAL, View::AGX, View::STANDARD, View::DISPLAY.with_white_balance(Some(4000.0))]
+        {
             for index in 0..17 * 17 * 17 {
                 let c = [index % 17, index / 17 % 17, index / 289].map(|i| i as f32 / 16.0);
                 let back = view.to_display(view.to_scene(c));
                 let worst = c.iter().zip(back).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-                assert!(worst < 1e-5, "{}: {c:?} came back as {back:?}", view.name());
+                assert!(worst < 1e-5, "{}: {c:?} came back as {back:?}", view.name().name());
             }
         }
     }
@@ -278,7 +297,7 @@ mod tests {
         let combined = (0..4096).map(|i| [steep[i % 16], steep[i / 16 % 16], steep[i / 256]]);
         let other = (0..40_000).map(|i| [0, 8, 16].map(|shift| (scattered(i) >> shift) as u8));
         let plate: Vec<[u8; 3]> = combined.chain(other).collect();
-        for view in [View::DISPLAY, View::AGX, View::STANDARD] {
+        for view in [View::DISPLAY, View::NEUTRAL, View::AGX, View::STANDARD] {
             let mut scene: Vec<[f32; 4]> =
                 plate.iter().map(|c| [decode_srgb8(c[0]), decode_srgb8(c[1]), decode_srgb8(c[2]), 1.0]).collect();
             view.to_scene_row(level, &mut scene);
@@ -288,7 +307,7 @@ mod tests {
             view.display_row(level, &scene, 7, -3, None, &mut sixteen);
             for ((plate, eight), sixteen) in plate.iter().zip(&eight).zip(&sixteen) {
                 let [r, g, b] = *plate;
-                assert_eq!(*eight, [r, g, b, 255], "{}", view.name());
+                assert_eq!(*eight, [r, g, b, 255], "{}", view.name().name());
                 // In 16 bits the roundings of the way through the scene may show as one step of 65535; two more by the powers of AgX.
                 let exact = [r, g, b, 255].map(|code| u16::from(code) * 257);
                 let steps = if view == View::AGX { 3 } else { 1 };
@@ -300,9 +319,7 @@ mod tests {
     #[test]
     fn every_level_gives_the_same_bytes() {
         let pixels = wild_pixels(4099);
-        for view in
-            [View::DISPLAY, View::AGX, View::STANDARD, View::RAW, View::DISPLAY.with_white_balance(Some(4000.0))]
-        {
+        for view in all_views().chain([View::DISPLAY.with_white_balance(Some(4000.0))]) {
             for alpha in ALPHA_MODES {
                 let (mut wide, mut narrow) = (vec![[0_u8; 4]; 4099], vec![[9_u8; 4]; 4099]);
                 view.display_row_with_mode(simd::level(), &pixels, 5, 11, alpha, &mut wide);
@@ -324,7 +341,7 @@ mod tests {
     #[test]
     fn rows_agree_with_the_scalar_view() {
         let pixels = wild_pixels(1000);
-        for view in [View::DISPLAY, View::AGX, View::DISPLAY.with_white_balance(Some(4000.0))] {
+        for view in [View::DISPLAY, View::NEUTRAL, View::AGX, View::DISPLAY.with_white_balance(Some(4000.0))] {
             let mut out = vec![[0_u16; 4]; pixels.len()];
             view.display_row(simd::level(), &pixels, 0, 0, None, &mut out);
             for (pixel, codes) in pixels.iter().zip(&out) {
@@ -371,7 +388,7 @@ mod tests {
     #[test]
     fn black_and_white_are_exact() {
         let row = [[0.0; 4], [0.0, 0.0, 0.0, 1.0], [20.0, 20.0, 20.0, 1.0], [1e6, 1e6, 1e6, 0.0]];
-        for view in [View::DISPLAY, View::STANDARD, View::RAW] {
+        for view in [View::DISPLAY, View::NEUTRAL, View::STANDARD, View::RAW] {
             for y in 0..50 {
                 let mut out = [[7_u8; 4]; 4];
                 for alpha in [AlphaConvention::Linear, AlphaConvention::Encoded] {
@@ -404,8 +421,8 @@ mod tests {
         let huge = [f32::INFINITY, f32::MAX, 1e38, 1e9];
         let row: Vec<[f32; 4]> = huge.iter().map(|&light| [light, light, light, 1.0]).collect();
         for kelvin in [None, Some(1500.0), Some(4000.0), Some(6504.0), Some(20_000.0)] {
-            for view in [View::DISPLAY, View::STANDARD].map(|view| view.with_white_balance(kelvin)) {
-                let name = view.name();
+            for view in [View::DISPLAY, View::NEUTRAL, View::STANDARD].map(|view| view.with_white_balance(kelvin)) {
+                let name = view.name().name();
                 for light in huge {
                     let shown = view.to_display([light; 3]);
                     assert!(shown.iter().all(|value| *value > 0.999_99), "{name} {kelvin:?} {light}: {shown:?}");
@@ -422,11 +439,11 @@ mod tests {
     }
 
     #[test]
-    fn names() {
-        for name in View::NAMES {
-            assert_eq!(View::from_name(name).map(|view| view.name()), Ok(name));
+    fn every_name_gives_the_view_of_that_name() {
+        assert_eq!(View::from(ViewName::default()), View::DISPLAY);
+        assert_eq!(all_views().count(), 5);
+        for (view, choice) in all_views().zip(ViewName::CHOICES) {
+            assert_eq!(view.name().name(), choice.name);
         }
-        let message = View::from_name("filmc").unwrap_err().to_string();
-        assert!(View::NAMES.iter().all(|name| message.contains(name)) && message.contains("filmc"), "{message}");
     }
 }

@@ -19,6 +19,9 @@ use super::{
     texture::{LayerMapping, ROWS, TextureLayer},
 };
 
+/// Largest distance between rows in which the eddies are computed, pixels; between them coordinates are interpolated.
+pub(crate) const MAX_EDDY_BAND: usize = 4;
+
 /// The eddies of one flame.
 #[derive(Clone, Debug)]
 pub(crate) struct Eddies {

@@ -18,9 +18,12 @@ use super::shade::{
     flame::{coordinates, shade_coordinates},
     shade_sample,
 };
-use crate::sheet::tables::{
-    color_ramp::ColorRamp,
-    shape_tables::{FlameCoordinates, ShapeTables},
+use crate::sheet::{
+    eddies::MAX_EDDY_BAND,
+    tables::{
+        color_ramp::ColorRamp,
+        shape_tables::{FlameCoordinates, ShapeTables},
+    },
 };
 
 /// One sheet with the inputs of drawing.
@@ -40,11 +43,6 @@ pub(crate) struct DrawContext<'a> {
 
 /// Texels between neighboring pixels up to which one lookup per pixel causes no visible aliasing.
 pub(crate) const MAX_MINIFICATION: f32 = 4.0;
-
-/// The same with eddies, which fold the texture along lines: there the eye sees less aliasing, and pixels cost most.
-pub(crate) const MAX_EDDY_MINIFICATION: f32 = 8.0;
-/// Largest distance between exact rows with eddies.
-pub(crate) const MAX_EDDY_BAND: usize = 4;
 
 /// Supersampling offsets from the pixel center, pixels across and up: rotated grid, no two in one column or row.
 const SUPERSAMPLES_4: [[f32; 2]; 4] = [[-0.375, 0.125], [-0.125, -0.375], [0.125, 0.375], [0.375, -0.125]];

@@ -20,7 +20,7 @@ use fearless_simd::Level;
 use super::{
     aovs::{AovContext, write_aov_rows},
     cells::{CellResolution, SheetCells, small_height},
-    draw::{DrawContext, MAX_EDDY_MINIFICATION, MAX_MINIFICATION, draw_rows, row_band_height},
+    draw::{DrawContext, MAX_MINIFICATION, draw_rows, row_band_height},
     draw_cells::{CellContext, CellSample, CellSums, TextureCells, draw_cells},
     shade::{SheetContent, TimeSample},
     soot_field::{SootContext, SootSample, draw_soot_rows},
@@ -244,7 +244,7 @@ impl PreparedSheet<'_> {
             content,
             absorbs,
             row_band,
-            max_minification: if command.flame.eddies.is_some() { MAX_EDDY_MINIFICATION } else { MAX_MINIFICATION },
+            max_minification: MAX_MINIFICATION,
         };
         fearless_simd::dispatch!(self.level, simd => draw_rows(simd, &context, rect, strip));
         if !strip.aovs.is_empty() {

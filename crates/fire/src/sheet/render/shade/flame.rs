@@ -5,8 +5,9 @@ use fearless_simd::Simd;
 
 use super::{ShadedBatch, SheetState};
 use crate::sheet::{
+    eddies::MAX_EDDY_BAND,
     equations,
-    render::{draw::MAX_EDDY_BAND, projection::SheetCoordinates},
+    render::projection::SheetCoordinates,
     tables::{
         color_ramp::ColorRamp,
         shape_tables::{FlameCoordinates, ShapeTables},
