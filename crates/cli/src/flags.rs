@@ -85,6 +85,7 @@ fn flag_of_error(error: &JobError) -> Option<&'static str> {
             })
         }
         JobError::Option(OptionError::OutOfMemory { channels: 0, .. }) => Some("--size"),
+        JobError::Option(OptionError::FramesInFlight { .. }) => Some("--frames-in-flight"),
         JobError::Streaks(error) => flag_of_streaks_error(error),
         _ => None,
     }

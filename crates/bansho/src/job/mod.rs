@@ -85,10 +85,22 @@ pub struct Job {
     pub resume: bool,
     /// Whether files that Bansho did not make may be overwritten. Files that the scene is read from never are.
     pub overwrite: bool,
+    /// How many frames are drawn at once.
+    pub frames_in_flight: FramesInFlight,
     /// Folder of snapshots of phenomena that are simulated in steps.
     pub snapshots: Option<PathBuf>,
     /// Frames between snapshots; `None` for one snapshot a second.
     pub snapshot_every: Option<u64>,
+}
+
+/// How many frames of a shot are drawn at once, where they do not follow from each other as in simulations. The files are the same for any number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FramesInFlight {
+    /// One with fewer than 8 threads or over a plate, else up to one for each thread, as far as memory and the number of frames suggest.
+    #[default]
+    Auto,
+    /// As many.
+    Count(usize),
 }
 
 impl Job {
@@ -114,6 +126,7 @@ impl Job {
             contact_background: ContactBackground::Black,
             resume: false,
             overwrite: false,
+            frames_in_flight: FramesInFlight::Auto,
             snapshots: None,
             snapshot_every: None,
         }

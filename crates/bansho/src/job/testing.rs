@@ -37,12 +37,14 @@ pub(crate) struct CountingSource {
     plan: Arc<Plan>,
     pub(crate) steps: usize,
     pub(crate) number: i64,
+    /// Whether several frames may be drawn at once.
+    pub(crate) is_closed_form: bool,
 }
 
 impl CountingSource {
     pub(crate) fn new() -> Self {
         let plan = plan();
-        Self { number: plan.frames().start - 1, plan, steps: 0 }
+        Self { number: plan.frames().start - 1, plan, steps: 0, is_closed_form: false }
     }
 }
 
@@ -63,6 +65,10 @@ impl FrameSource for CountingSource {
     }
 
     fn recycle(&mut self, _recycled: Frame) {}
+
+    fn independent(&self) -> Option<Self> {
+        self.is_closed_form.then(|| Self { plan: self.plan.clone(), ..*self })
+    }
 
     fn snapshot(&self) -> Vec<u8> {
         state(self.number)

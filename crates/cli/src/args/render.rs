@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bansho::{
     AlphaConvention, BitDepth, Rect, View,
-    job::{ContactBackground, Job, JobError},
+    job::{ContactBackground, FramesInFlight, Job, JobError},
 };
 use clap::Args;
 
@@ -106,6 +106,10 @@ pub(crate) struct RenderArgs {
     /// Keep existing frames that are complete and belong to this scene; draw all others. Only for .png and .exr files.
     #[arg(long, help_heading = "Work")]
     resume: bool,
+    /// How many frames are drawn at once, where they do not follow from each other as in simulations: a number, or `auto`: one with fewer than 8 threads or
+    /// over a plate, else up to one for each thread. The files are the same for any number.
+    #[arg(long, value_name = "auto|N", default_value = "auto", value_parser = values::parse_frames_in_flight, help_heading = "Work")]
+    frames_in_flight: FramesInFlight,
     #[command(flatten)]
     states: StateArgs,
     #[command(flatten)]
@@ -139,6 +143,7 @@ impl RenderArgs {
             contact_sheet: self.contact_sheet,
             contact_background: self.contact_background,
             resume: self.resume,
+            frames_in_flight: self.frames_in_flight,
             overwrite: self.output.overwrite,
             snapshots: self.states.snapshots.clone(),
             snapshot_every: self.states.snapshot_every,

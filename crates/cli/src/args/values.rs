@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bansho::{
     AlphaConvention, BitDepth, Rect, View, ViewName,
     job::frames::{self, FrameListError},
-    job::{ContactBackground, FlipbookCrop, StreakFormat},
+    job::{ContactBackground, FlipbookCrop, FramesInFlight, StreakFormat},
     rain::{OpacityLaw, VelocityLaw},
     scene::picture::LARGEST_SIDE,
 };
@@ -68,6 +68,14 @@ fn pair(text: &str, max: usize) -> Option<[usize; 2]> {
 
 pub(super) fn parse_size(text: &str) -> Result<[usize; 2], ValueError> {
     pair(text, LARGEST_SIDE as usize).ok_or(ValueError::Size)
+}
+
+/// `auto`, or a number of frames.
+pub(super) fn parse_frames_in_flight(text: &str) -> Result<FramesInFlight, ValueError> {
+    match parse_chunk(text)? {
+        ChunkLength::Auto => Ok(FramesInFlight::Auto),
+        ChunkLength::Frames(count) => Ok(FramesInFlight::Count(count as usize)),
+    }
 }
 
 /// `auto`, or a number of frames.

@@ -10,6 +10,7 @@ use bansho_base::{
 use bansho_render::{CompiledScene, Plan, display::BitDepth, moment_bytes_per_thread, source_window};
 
 use crate::job::{
+    FramesInFlight,
     error::{JobError, OptionError},
     scene_file::SceneFile,
 };
@@ -24,6 +25,15 @@ const PLATE_FILE_BYTES: f64 = 16.0;
 const BLURRED_PLATE_PIXEL: usize = 2;
 /// Bytes of the frames whose pixels are in memory at once, unless a single frame is larger.
 const MAX_BYTES_OF_PIXELS: usize = 1 << 27;
+/// Bytes of the frames that are drawn at once, unless a single frame is larger, or their number is stated.
+const MAX_BYTES_DRAWN_AT_ONCE: f64 = GIB;
+/// Fewest threads for which several frames are drawn at once, unless their number is stated. With 16 threads they gained a fifth to a third, with two
+/// they lost as much as they gained.
+const MIN_THREADS_FOR_MANY: usize = 8;
+/// Fewest frames of the job for each of those that are drawn at once: what a first frame fills caches with is computed for each.
+const MIN_FRAMES_FOR_EACH: usize = 16;
+/// Most frames that are drawn at once, unless their number is stated: with more of them threads share the caches of fewer.
+const MAX_DRAWN_AT_ONCE: usize = 16;
 /// Bytes of the process without a picture.
 const PROCESS_BYTES: f64 = 1.2e7;
 const GIB: f64 = (1 << 30) as f64;
@@ -44,6 +54,69 @@ pub(crate) struct MemoryRequest {
     pub(crate) display: Option<BitDepth>,
     /// Whether the size of the picture is an option of the job, rather than the scene's.
     pub(crate) size_is_option: bool,
+    /// How many frames are drawn at once.
+    pub(crate) in_flight: FramesInFlight,
+}
+
+/// How many frames are drawn at once: one where they follow from each other, as in simulations. Otherwise as many as are stated; by default one on
+/// few threads, and on many one for each as far as memory and the number of frames suggest.
+pub(crate) fn frames_drawn_at_once(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest) -> usize {
+    if compiled.phenomena().any(|phenomenon| phenomenon.info().stepping.is_some()) {
+        return 1;
+    }
+    let threads = rayon::current_num_threads();
+    let count = match request.in_flight {
+        FramesInFlight::Count(count) => count,
+        // Few threads are busy with the parts of one frame, and a plate would be read for each of the frames.
+        FramesInFlight::Auto if threads < MIN_THREADS_FOR_MANY || plan.scene().has_plate() => 1,
+        FramesInFlight::Auto => {
+            let window = source_window(plan);
+            let frame = FrameBytes::new(compiled, plan, request, channel_count(compiled, plan));
+            let bytes = (frame.drawn() + frame.written) * pixel_count([window.width, window.height], 0);
+            let by_memory = (MAX_BYTES_DRAWN_AT_ONCE / bytes.max(1.0)) as usize;
+            threads.min(MAX_DRAWN_AT_ONCE).min(by_memory).min(request.frames / MIN_FRAMES_FOR_EACH)
+        }
+    };
+    count.min(request.frames).max(1)
+}
+
+/// Memory of a frame for each of its pixels, bytes.
+struct FrameBytes {
+    /// Its light, where that is kept.
+    light: f64,
+    /// What its glare takes.
+    glare: f64,
+    /// Its display pixels.
+    display: f64,
+    /// The samples of its file, and the file itself.
+    written: f64,
+}
+
+impl FrameBytes {
+    /// The memory of a frame with `channels` channels of layers and AOVs.
+    fn new(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, channels: usize) -> Self {
+        let refracts = refracts(compiled, plan);
+        let has_glare = plan.glare > 0.0;
+        let depth = if request.display.is_none() || refracts { DEPTH_BYTES } else { 0.0 };
+        // Where only display pixels are kept, there is no light of a whole picture.
+        let has_light = request.display.is_none() || request.tiles > 0 || refracts || has_glare;
+        let light = if has_light { FRAME_BYTES + depth + 4.0 * channels as f64 } else { 0.0 };
+        // The pyramid, and the light without that of the plate.
+        let plate_apart = if plan.scene().has_plate() { FRAME_BYTES } else { 0.0 };
+        let glare = if has_glare { FRAME_BYTES / 3.0 + plate_apart } else { 0.0 };
+        // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
+        let [display, written] = match request.display {
+            Some(BitDepth::Eight) => [4.0, 3.0 + 2.0],
+            Some(BitDepth::Sixteen) => [8.0, 6.0 + 5.0],
+            None => [0.0, 12.0 + 3.0 * channels as f64],
+        };
+        Self { light, glare, display, written }
+    }
+
+    /// What a frame takes while it is drawn.
+    fn drawn(&self) -> f64 {
+        self.light + self.glare + self.display
+    }
 }
 
 /// Memory of a job for each pixel.
@@ -57,35 +130,24 @@ struct BytesPerPixel {
 impl BytesPerPixel {
     /// The memory of a job whose frames have `channels` channels of layers and AOVs.
     fn new(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, channels: usize) -> Self {
-        let refracts = refracts(compiled, plan);
-        let depth = if request.display.is_none() || refracts { DEPTH_BYTES } else { 0.0 };
-        // Where only display pixels are kept, there is no light of a whole picture.
-        let has_glare = plan.glare > 0.0;
-        let has_light = request.display.is_none() || request.tiles > 0 || refracts || has_glare;
-        let frame = if has_light { FRAME_BYTES + depth + 4.0 * channels as f64 } else { 0.0 };
-        // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
-        let [display, file] = match request.display {
-            Some(BitDepth::Eight) => [4.0, 3.0 + 2.0],
-            Some(BitDepth::Sixteen) => [8.0, 6.0 + 5.0],
-            None => [0.0, 12.0 + 3.0 * channels as f64],
-        };
+        let frame = FrameBytes::new(compiled, plan, request, channels);
         // The next picture is drawn while one is written. What remains empty in it takes no memory, but a plate fills it.
         let has_plate = plan.scene().has_plate();
         let pictures = if has_plate && request.tiles == 0 { request.frames.min(2) as f64 } else { 1.0 };
-        let written = pictures * display + file;
+        let written = pictures * frame.display + frame.written;
         // One frame is written while another one is drawn, in the memory of the former where it is large and its pixels are no longer needed
         // (`draw_frames`). A sheet keeps the pixels of all, and is laid out and encoded as a whole.
         let window = plan.window();
-        let max_with_pixels =
-            max_frames_with_pixels(window.width * window.height * frame as usize, request.display.is_none());
-        let (drawn, encoded) = (request.frames.min(2).min(max_with_pixels), request.tiles.max(1));
-        let drawn = drawn as f64 * frame + encoded as f64 * written;
+        let light_bytes = window.width * window.height * frame.light as usize;
+        let max_with_pixels = max_frames_with_pixels(light_bytes, request.display.is_none());
+        let (with_light, encoded) = (request.frames.min(2).min(max_with_pixels), request.tiles.max(1));
+        let one_after_the_other = with_light as f64 * frame.light + frame.glare + encoded as f64 * written;
+        let drawn = match frames_drawn_at_once(compiled, plan, request) {
+            1 => one_after_the_other,
+            count => count as f64 * (frame.drawn() + frame.written) + (encoded - 1) as f64 * written,
+        };
         let plate_depth = if plan.scene().plate.depth.is_some() { DEPTH_BYTES } else { 0.0 };
         let plate = if has_plate { FRAME_BYTES + plate_depth } else { 0.0 };
-        // The pyramid, and the light without that of the plate.
-        let plate_apart = if has_plate { FRAME_BYTES } else { 0.0 };
-        let glare = if has_glare { FRAME_BYTES / 3.0 + plate_apart } else { 0.0 };
-        let drawn = drawn + glare;
         Self { drawn, whole: plate + reflected(compiled, plan, plate) }
     }
 
@@ -115,7 +177,10 @@ pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: Me
     let (drawn, whole) =
         (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
-    per_pixel.total(drawn, whole) + phenomena_bytes(compiled, plan, drawn) + fixed_picture_bytes(compiled, plan)
+    let at_once = frames_drawn_at_once(compiled, plan, request) as f64;
+    per_pixel.total(drawn, whole)
+        + at_once * phenomena_bytes(compiled, plan, drawn)
+        + fixed_picture_bytes(compiled, plan)
 }
 
 /// Memory of the file of a plate, of the moments of exposures, and of the process, bytes.
@@ -179,6 +244,16 @@ pub(crate) fn check(
         return Ok(());
     }
     check_without_pixels(scene, compiled, plan)?;
+    if let FramesInFlight::Count(count @ 2..) = request.in_flight {
+        let fits = |count: i64| {
+            let request = MemoryRequest { in_flight: FramesInFlight::Count(count as usize), ..request };
+            memory::can_allocate(estimated_bytes(compiled, plan, request))
+        };
+        if fits(1) {
+            let max = memory::largest_fitting_count(count as i64, fits) as usize;
+            return Err(OptionError::FramesInFlight { count, required_gib: bytes / GIB, max }.into());
+        }
+    }
     // The overscan is the problem only if the picture without it would fit.
     let without_overscan = pixel_count(plan.size(), 0);
     if overscan > 0
@@ -281,7 +356,13 @@ mod tests {
         let text = format!("bansho = 2\n[picture]\nsize = {picture}\n[plate]\nimage = \"plate.png\"\n");
         let compiled = crate::compile_scene("test", &text, Arc::new(assets)).unwrap();
         let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
-        let request = MemoryRequest { frames: 1, tiles: 0, display: Some(BitDepth::Eight), size_is_option: false };
+        let request = MemoryRequest {
+            frames: 1,
+            tiles: 0,
+            display: Some(BitDepth::Eight),
+            size_is_option: false,
+            in_flight: FramesInFlight::Auto,
+        };
         estimated_bytes(&compiled, &plan, request)
     }
 

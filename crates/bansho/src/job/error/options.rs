@@ -60,6 +60,16 @@ pub enum OptionError {
         /// Largest width and height in the same proportions for which there is enough memory.
         max_size: [usize; 2],
     },
+    /// More frames at once than there is memory for.
+    #[error("{count} frames in flight would take {required_gib:.1} GiB; allowed: auto, or 1 to {max}")]
+    FramesInFlight {
+        /// How many were requested.
+        count: usize,
+        /// Memory that the job would need, GiB.
+        required_gib: f64,
+        /// How many there is memory for.
+        max: usize,
+    },
     /// An output is one of the files that the scene is read from.
     #[error("{path}: is a file that the scene is read from; allowed: any other name", path = .path.display())]
     OutputIsInput {

@@ -121,7 +121,10 @@ pub(crate) fn lit_region(
         over_black: false,
     };
     let probe = LitRegionProbe { lit: Mutex::default(), target, min_alpha };
-    draw_frames(&mut Shot::open(compiled.clone(), Arc::new(small)), numbers, &Snapshots::default(), &probe, observer)?;
+    let mut shot = Shot::open(compiled.clone(), Arc::new(small));
+    // The pictures are small.
+    let at_once = rayon::current_num_threads();
+    draw_frames(&mut shot, numbers, &Snapshots::default(), at_once, &probe, observer)?;
     let lit = probe.lit.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok((!lit.is_empty()).then(|| Region::new(&lit, size)))
 }

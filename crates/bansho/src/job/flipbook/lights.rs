@@ -1,5 +1,10 @@
 //! The point lights of a flipbook: one for each phenomenon that shines, in each frame.
 
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, PoisonError},
+};
+
 use bansho_base::{
     camera::Camera,
     frame::Frame,
@@ -48,34 +53,43 @@ fn flame_lights(shot: &Shot) -> Vec<FlameLight> {
 /// A shot whose lights are recorded as its frames are drawn.
 pub(crate) struct LightRecorder {
     shot: Shot,
-    /// The lights of each frame that was drawn, in order.
-    lights: Vec<Vec<FlameLight>>,
+    /// Number of the frame that the shot was advanced to.
+    number: i64,
+    /// The lights of each frame that was drawn, by its number. Shots that draw at the same time share them.
+    lights: Arc<Mutex<BTreeMap<i64, Vec<FlameLight>>>>,
 }
 
 impl LightRecorder {
     pub(crate) fn new(shot: Shot) -> Self {
-        Self { shot, lights: Vec::new() }
+        Self { shot, number: 0, lights: Arc::default() }
     }
 
     /// The lights of each frame that was drawn, in order.
     pub(crate) fn into_lights(self) -> Vec<Vec<FlameLight>> {
-        self.lights
+        std::mem::take(&mut *self.lights.lock().unwrap_or_else(PoisonError::into_inner)).into_values().collect()
     }
 }
 
 impl FrameSource for LightRecorder {
     fn advance(&mut self, number: i64, observer: &dyn Observer) -> Result<(), RenderError> {
+        self.number = number;
         self.shot.advance(number, observer)
     }
 
     fn draw<T: Target>(&mut self, target: &T, observer: &dyn Observer) -> Result<T::Frame, RenderError> {
         let frame = self.shot.draw(target, observer)?;
-        self.lights.push(flame_lights(&self.shot));
+        let lights = flame_lights(&self.shot);
+        self.lights.lock().unwrap_or_else(PoisonError::into_inner).insert(self.number, lights);
         Ok(frame)
     }
 
     fn recycle(&mut self, recycled: Frame) {
         self.shot.recycle(recycled);
+    }
+
+    fn independent(&self) -> Option<Self> {
+        let lights = self.lights.clone();
+        self.shot.independent().map(|shot| Self { shot, number: self.number, lights })
     }
 
     fn snapshot(&self) -> Vec<u8> {

@@ -28,6 +28,7 @@ use self::{
     lights::LightRecorder,
 };
 use super::{
+    FramesInFlight,
     checks::{
         memory::{self, MemoryRequest},
         outputs, plates,
@@ -135,7 +136,7 @@ impl Flipbook {
         let numbers: Vec<i64> = (first..first.saturating_add(sheet.count as i64)).collect();
         plates::check(&self.scene, &compiled, &numbers)?;
         let frames = numbers.len();
-        let request = MemoryRequest { frames, tiles: frames, display: Some(self.bits), size_is_option: true };
+        let request = memory_request(frames, self.bits);
         memory::check(&self.scene, &compiled, &plan, request)?;
         let overwrite = OverwritePolicy::new(outputs::input_files(&self.scene, &plan, &numbers), self.overwrite);
         let files = self.files(plan.display, overwrite)?;
@@ -219,7 +220,8 @@ impl PreparedFlipbook {
         let (plan, sheet) = &self.cropped(observer).map_err(|error| self.described(error))?;
         let collector = TileCollector::new(sheet.count, observer, |frame, observer| files.tile(frame, observer));
         let mut shot = LightRecorder::new(Shot::open(compiled.clone(), plan.clone()));
-        draw_frames(&mut shot, numbers, &Snapshots::default(), &collector, observer)
+        let at_once = memory::frames_drawn_at_once(compiled, plan, memory_request(numbers.len(), files.bits));
+        draw_frames(&mut shot, numbers, &Snapshots::default(), at_once, &collector, observer)
             .map_err(|error| self.described(error))?;
         let tiles = collector.into_tiles();
         if !tiles.iter().any(Tile::has_motion) {
@@ -261,10 +263,16 @@ impl PreparedFlipbook {
         let layout = SheetLayout { cell: [crop.width, crop.height], ..self.sheet };
         let sheet = sheet::check_layout(layout, SheetKind::Flipbook)?;
         let frames = self.numbers.len();
-        let request = MemoryRequest { frames, tiles: frames, display: Some(self.files.bits), size_is_option: true };
+        let request = memory_request(frames, self.files.bits);
         memory::check(&self.scene, &self.compiled, &plan, request)?;
         Ok((plan, sheet))
     }
+}
+
+/// What the memory of a sheet of so many frames depends on.
+fn memory_request(frames: usize, bits: BitDepth) -> MemoryRequest {
+    let in_flight = FramesInFlight::Auto;
+    MemoryRequest { frames, tiles: frames, display: Some(bits), size_is_option: true, in_flight }
 }
 
 /// The frame rate at which `count` frames last `seconds`.

@@ -1,4 +1,7 @@
-//! Draws the frames of a job one after the other. Whichever thread of the pool is free finishes them: encodes and writes them.
+//! Draws the frames of a job. Where they follow from each other, as in simulations, one after the other; whichever thread of the pool is free finishes them:
+//! encodes and writes them. Closed forms are drawn several at a time, since what is serial within a frame leaves threads idle.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use bansho_base::{
     frame::{Frame, FrameHeader, PhenomenonMetadata},
@@ -126,7 +129,8 @@ impl DrawnFrame for DisplayFrame {
 /// Bytes of frames that may be in flight at once, unless two frames alone are larger.
 const MAX_BYTES_IN_FLIGHT: usize = 1 << 30;
 
-/// Draws the frames `numbers` in order. A frame is drawn while earlier ones are still being compressed and written.
+/// Draws the frames `numbers` in order. A frame is drawn while earlier ones are still being compressed and written; if the source allows it, up to `drawn_at_once`
+/// frames are drawn at the same time.
 ///
 /// Runs in the caller's rayon pool, and uses no other thread.
 ///
@@ -136,9 +140,14 @@ pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
     shot: &mut S,
     numbers: &[i64],
     snapshots: &Snapshots,
+    drawn_at_once: usize,
     sink: &K,
     observer: &dyn JobObserver,
 ) -> Result<(), JobError> {
+    let sources = independent_sources(shot, drawn_at_once.min(numbers.len()));
+    if sources.len() > 1 {
+        return draw_independent(sources, numbers, sink, observer);
+    }
     let in_flight = InFlightFrames::default();
     let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
     let (mut last, mut max_with_light) = (None, usize::MAX);
@@ -161,6 +170,69 @@ pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
     // A failed frame also cancels the drawing, whose own error is then `Cancelled`: the first failure is the one to report.
     in_flight.take_error().map_or(drawn, Err)?;
     check(observer).map_err(|_| JobError::Cancelled)
+}
+
+/// As many sources as frames may be drawn at once, if `source` has frames that do not follow from each other.
+fn independent_sources<S: FrameSource>(source: &S, count: usize) -> Vec<S> {
+    if count < 2 {
+        return Vec::new();
+    }
+    std::iter::from_fn(|| source.independent()).take(count).collect()
+}
+
+/// Draws and finishes frames, as many at once as there are sources. Each is a task of the pool, and so are its parts: a thread that waits for parts of its frame
+/// takes on those of others.
+fn draw_independent<S: FrameSource, K: FrameSink>(
+    sources: Vec<S>,
+    numbers: &[i64],
+    sink: &K,
+    observer: &dyn JobObserver,
+) -> Result<(), JobError> {
+    // A film takes frames in order, and holds back no more than its window.
+    let window = sources.len().min(sink.max_in_flight()).max(1);
+    let in_flight = InFlightFrames::default();
+    let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
+    let free = Mutex::new(sources);
+    rayon::in_place_scope_fifo(|scope| {
+        for (index, &number) in numbers.iter().enumerate() {
+            in_flight.submit(index, window, true);
+            if stop_on_failure.cancelled() {
+                break;
+            }
+            let (in_flight, free, stop_on_failure) = (&in_flight, &free, &stop_on_failure);
+            scope.spawn_fifo(move |_| {
+                let _completion = CompletionGuard { in_flight, index };
+                // There are as many sources as frames in the window, and a frame returns its source before it leaves the window.
+                let Some(mut source) = lock(free).pop() else { return };
+                let drawn = draw_and_finish(&mut source, (index, number), sink, stop_on_failure);
+                lock(free).push(source);
+                drawn.unwrap_or_else(|error| in_flight.fail(error));
+            });
+        }
+    });
+    in_flight.take_error().map_or(Ok(()), Err)?;
+    check(observer).map_err(|_| JobError::Cancelled)
+}
+
+/// Draws frame `number`, which is at position `index` of the list, and finishes it.
+fn draw_and_finish<S: FrameSource, K: FrameSink>(
+    source: &mut S,
+    (index, number): (usize, i64),
+    sink: &K,
+    observer: &StopOnFailure,
+) -> Result<(), JobError> {
+    source.advance(number, observer)?;
+    let mut frame = source.draw(sink.target(), observer)?;
+    sink.finish(index, &mut frame, observer)?;
+    if let Some(light) = frame.into_light() {
+        source.recycle(light);
+    }
+    Ok(())
+}
+
+/// The sources are only pushed and popped under the lock, so they are valid even if a thread panicked.
+fn lock<S>(sources: &Mutex<Vec<S>>) -> MutexGuard<'_, Vec<S>> {
+    sources.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Finishes a drawn frame.
@@ -230,74 +302,103 @@ mod tests {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
     }
 
-    fn run(numbers: &[i64], sink: &impl FrameSink, observer: &RecordingObserver) -> Result<(), JobError> {
-        draw_frames(&mut CountingSource::new(), numbers, &Snapshots::default(), sink, observer)
+    /// Draws frames one after the other, or several of a closed form at once.
+    fn run(
+        numbers: &[i64],
+        drawn_at_once: usize,
+        sink: &impl FrameSink,
+        observer: &RecordingObserver,
+    ) -> Result<(), JobError> {
+        let mut source = CountingSource::new();
+        source.is_closed_form = drawn_at_once > 1;
+        draw_frames(&mut source, numbers, &Snapshots::default(), drawn_at_once, sink, observer)
     }
 
     #[test]
     fn every_frame_is_finished_once_with_its_index_in_any_pool() {
-        for threads in [1, 2, 7] {
+        for (threads, drawn_at_once) in [(1, 1), (2, 1), (7, 1), (1, 3), (2, 3), (7, 3), (7, 64)] {
             let done = Mutex::new(Vec::new());
             let each = |index, number| {
                 done.lock().unwrap().push((index, number));
                 Ok(())
             };
-            in_pool(threads, || {
-                run(&[3, 4, 9, 10], &FunctionSink { each, max_in_flight: 64 }, &RecordingObserver::default())
-            })
-            .unwrap();
+            let sink = FunctionSink { each, max_in_flight: 64 };
+            in_pool(threads, || run(&[3, 4, 9, 10], drawn_at_once, &sink, &RecordingObserver::default())).unwrap();
             let mut done = done.into_inner().unwrap();
             done.sort_unstable();
-            assert_eq!(done, [(0, 3), (1, 4), (2, 9), (3, 10)]);
+            assert_eq!(done, [(0, 3), (1, 4), (2, 9), (3, 10)], "{threads} {drawn_at_once}");
         }
     }
 
     #[test]
     fn no_frame_runs_further_ahead_of_the_oldest_than_the_window() {
         const WINDOW: usize = 3;
-        let unfinished = Mutex::new((0..60).collect::<std::collections::BTreeSet<usize>>());
-        let furthest = AtomicUsize::new(0);
-        let each = |index: usize, _| {
-            let oldest = *unfinished.lock().unwrap().first().unwrap();
-            furthest.fetch_max(index - oldest, Ordering::Relaxed);
-            thread::sleep(Duration::from_millis([5, 0, 1][index % 3]));
-            unfinished.lock().unwrap().remove(&index);
-            Ok(())
-        };
-        let numbers: Vec<i64> = (0..60).collect();
-        in_pool(8, || run(&numbers, &FunctionSink { each, max_in_flight: WINDOW }, &RecordingObserver::default()))
-            .unwrap();
-        let furthest = furthest.into_inner();
-        assert!((1..WINDOW).contains(&furthest), "{furthest}: frames must overlap, but stay within the window");
+        for drawn_at_once in [1, 2, 8] {
+            let unfinished = Mutex::new((0..60).collect::<std::collections::BTreeSet<usize>>());
+            let furthest = AtomicUsize::new(0);
+            let each = |index: usize, _| {
+                let oldest = *unfinished.lock().unwrap().first().unwrap();
+                furthest.fetch_max(index - oldest, Ordering::Relaxed);
+                thread::sleep(Duration::from_millis([5, 0, 1][index % 3]));
+                unfinished.lock().unwrap().remove(&index);
+                Ok(())
+            };
+            let numbers: Vec<i64> = (0..60).collect();
+            let sink = FunctionSink { each, max_in_flight: WINDOW };
+            in_pool(8, || run(&numbers, drawn_at_once, &sink, &RecordingObserver::default())).unwrap();
+            let furthest = furthest.into_inner();
+            assert!((1..WINDOW).contains(&furthest), "{furthest}: frames must overlap, but stay within the window");
+        }
     }
 
     #[test]
     fn a_failure_stops_the_work_and_is_returned() {
-        let finished = AtomicUsize::new(0);
-        let each = |index, _| {
-            finished.fetch_add(1, Ordering::Relaxed);
-            if index == 5 { Err(OptionError::NoFrames.into()) } else { Ok(()) }
-        };
-        let numbers: Vec<i64> = (0..100_000).collect();
-        let result =
-            in_pool(2, || run(&numbers, &FunctionSink { each, max_in_flight: 8 }, &RecordingObserver::default()));
-        assert!(matches!(result, Err(JobError::Option(OptionError::NoFrames))), "{result:?}");
-        assert!(finished.into_inner() < 100, "drawing must stop");
+        for drawn_at_once in [1, 2] {
+            let finished = AtomicUsize::new(0);
+            let each = |index, _| {
+                finished.fetch_add(1, Ordering::Relaxed);
+                if index == 5 { Err(OptionError::NoFrames.into()) } else { Ok(()) }
+            };
+            let numbers: Vec<i64> = (0..100_000).collect();
+            let sink = FunctionSink { each, max_in_flight: 8 };
+            let result = in_pool(2, || run(&numbers, drawn_at_once, &sink, &RecordingObserver::default()));
+            assert!(matches!(result, Err(JobError::Option(OptionError::NoFrames))), "{result:?}");
+            assert!(finished.into_inner() < 100, "drawing must stop");
+        }
     }
 
     #[test]
     fn cancellation_takes_effect_between_frames() {
-        let observer = RecordingObserver::default();
-        let finished = AtomicUsize::new(0);
+        for drawn_at_once in [1, 2] {
+            let observer = RecordingObserver::default();
+            let finished = AtomicUsize::new(0);
+            let each = |_, _| {
+                if finished.fetch_add(1, Ordering::Relaxed) == 9 {
+                    observer.stop.store(true, Ordering::Relaxed);
+                }
+                Ok(())
+            };
+            let numbers: Vec<i64> = (0..100_000).collect();
+            let sink = FunctionSink { each, max_in_flight: 8 };
+            let result = in_pool(2, || run(&numbers, drawn_at_once, &sink, &observer));
+            assert!(matches!(result, Err(JobError::Cancelled)), "{result:?}");
+            assert!((10..100).contains(&finished.into_inner()));
+        }
+    }
+
+    #[test]
+    fn frames_of_a_closed_form_are_drawn_at_the_same_time() {
+        let (running, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let each = |_, _| {
-            if finished.fetch_add(1, Ordering::Relaxed) == 9 {
-                observer.stop.store(true, Ordering::Relaxed);
-            }
+            most.fetch_max(running.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            thread::sleep(Duration::from_millis(5));
+            running.fetch_sub(1, Ordering::SeqCst);
             Ok(())
         };
-        let numbers: Vec<i64> = (0..100_000).collect();
-        let result = in_pool(2, || run(&numbers, &FunctionSink { each, max_in_flight: 8 }, &observer));
-        assert!(matches!(result, Err(JobError::Cancelled)), "{result:?}");
-        assert!((10..100).contains(&finished.into_inner()));
+        let numbers: Vec<i64> = (0..40).collect();
+        let sink = FunctionSink { each, max_in_flight: 64 };
+        in_pool(4, || run(&numbers, 3, &sink, &RecordingObserver::default())).unwrap();
+        let most = most.into_inner();
+        assert!((2..=3).contains(&most), "{most} at once");
     }
 }

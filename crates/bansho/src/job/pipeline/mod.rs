@@ -14,6 +14,10 @@ pub(crate) trait FrameSource: Send {
     where
         Self: Sized;
     fn recycle(&mut self, recycled: Frame);
+    /// Another source of the same frames, which may be drawn at the same time; `None` where frames follow from those before.
+    fn independent(&self) -> Option<Self>
+    where
+        Self: Sized;
     fn snapshot(&self) -> Vec<u8>;
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), RenderError>;
     /// Whether a snapshot is whole, of whatever scene.
@@ -33,6 +37,10 @@ impl FrameSource for Shot {
 
     fn recycle(&mut self, recycled: Frame) {
         Self::recycle(self, recycled);
+    }
+
+    fn independent(&self) -> Option<Self> {
+        Self::independent(self)
     }
 
     fn snapshot(&self) -> Vec<u8> {

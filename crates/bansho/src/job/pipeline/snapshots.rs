@@ -246,7 +246,7 @@ mod tests {
     fn steps(snapshots: &Snapshots, numbers: &[i64], observer: &RecordingObserver) -> usize {
         let mut source = CountingSource::new();
         let sink = FunctionSink { each: |_, _| Ok(()), max_in_flight: 4 };
-        draw_frames(&mut source, numbers, snapshots, &sink, observer).unwrap();
+        draw_frames(&mut source, numbers, snapshots, 1, &sink, observer).unwrap();
         source.steps
     }
 

@@ -83,7 +83,7 @@ impl PreparedJob {
         finished: &FinishedFiles,
         observer: &dyn JobObserver,
     ) -> Result<(), JobError> {
-        let max_in_flight = rayon::current_num_threads() + 1;
+        let max_in_flight = (rayon::current_num_threads() + 1).max(self.drawn_at_once);
         let sink =
             self.format.open(&self.plan, self.compiled.has_opaque_plate(), numbers.len(), size, max_in_flight)?;
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
@@ -91,12 +91,12 @@ impl PreparedJob {
         match format.display_options(&sink) {
             Some(target) => {
                 let files = FileWriter { format, target, sink: &sink, max_in_flight, observer, drawn, finished };
-                draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?;
+                draw_frames(&mut shot, numbers, &self.snapshots, self.drawn_at_once, &files, observer)?;
             }
             None => {
                 let target = SceneLinear;
                 let files = FileWriter { format, target, sink: &sink, max_in_flight, observer, drawn, finished };
-                draw_frames(&mut shot, numbers, &self.snapshots, &files, observer)?;
+                draw_frames(&mut shot, numbers, &self.snapshots, self.drawn_at_once, &files, observer)?;
             }
         }
         Ok(sink.finish()?)
@@ -109,7 +109,7 @@ impl PreparedJob {
             contact_sheet::tile(frame, self.contact_background, &self.format, observer)
         });
         let mut shot = Shot::open(self.compiled.clone(), self.plan.clone());
-        draw_frames(&mut shot, &self.frames, &self.snapshots, &collector, observer)?;
+        draw_frames(&mut shot, &self.frames, &self.snapshots, self.drawn_at_once, &collector, observer)?;
         let _stage = StageGuard::begin(observer, Stage::Write);
         let picture = contact_sheet::compose_contact_sheet(&collector.into_tiles(), sheet)?;
         let fingerprint = self.contact_sheet_fingerprint();

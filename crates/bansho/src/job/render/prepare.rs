@@ -29,7 +29,7 @@ use super::{
     output::Format,
 };
 use crate::job::{
-    Job,
+    FramesInFlight, Job,
     checks::{
         memory::{self, MemoryRequest},
         outputs, plates,
@@ -55,6 +55,7 @@ pub struct PreparedJob {
     pub(crate) snapshots: Snapshots,
     pub(crate) warnings: Vec<Warning>,
     pub(crate) memory_bytes: f64,
+    pub(crate) drawn_at_once: usize,
 }
 
 impl PreparedJob {
@@ -139,7 +140,7 @@ pub fn check_scene(scene: &SceneFile) -> Result<(Arc<CompiledScene>, Plan), JobE
         Plan::with_exposure_and_loop_start(plan.scene().clone(), &with_overscan, plan.exposure_ev100, plan.loop_start)?;
     let frames = (plan.frames().end - plan.frames().start) as usize;
     let display = (with_overscan.overscan() == 0).then_some(BitDepth::Eight);
-    let request = MemoryRequest { frames, tiles: 0, display, size_is_option: false };
+    let request = MemoryRequest { frames, tiles: 0, display, size_is_option: false, in_flight: FramesInFlight::Auto };
     memory::check(scene, &compiled, &with_overscan, request)?;
     plates::check(scene, &compiled, &plan.frames().collect::<Vec<_>>())?;
     Ok((compiled, plan))
@@ -204,6 +205,7 @@ impl Job {
             resume: self.resume && kind.is_sequence() && sheet.is_none(),
             warnings: Vec::new(),
             memory_bytes: memory::estimated_bytes(&compiled, &plan, memory_request),
+            drawn_at_once: memory::frames_drawn_at_once(&compiled, &plan, memory_request),
             compiled,
             plan,
             frames,
@@ -227,7 +229,13 @@ impl Job {
 
     fn memory_request(&self, kind: OutputKind, frames: usize) -> MemoryRequest {
         let display = (!kind.is_scene_linear()).then_some(self.bits);
-        MemoryRequest { frames, tiles: self.contact_sheet.unwrap_or(0), display, size_is_option: self.size.is_some() }
+        MemoryRequest {
+            frames,
+            tiles: self.contact_sheet.unwrap_or(0),
+            display,
+            size_is_option: self.size.is_some(),
+            in_flight: self.frames_in_flight,
+        }
     }
 
     /// Every file that will be written.

@@ -65,3 +65,24 @@ fn channels_that_there_is_no_memory_for_are_counted() {
     assert!(run.stderr.contains("6000 x 6000 pixels with "), "{}", run.stderr);
     assert!(run.stderr.contains(" more channels would take "), "{}", run.stderr);
 }
+
+#[test]
+fn more_frames_in_flight_than_there_is_memory_for_are_refused_with_the_number_that_fits() {
+    let folder = Folder::with_scene(FLAME);
+    let render = |count: &str| {
+        let line =
+            format!("render scene.toml --size 4000x4000 --frames 0-99 --frames-in-flight {count} --out f.####.exr");
+        run_within(&folder, 2_000_000, &line)
+    };
+    let run = render("90");
+    assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("--frames-in-flight: 90 frames in flight would take "), "{}", run.stderr);
+    let most: usize = run.stderr.split("auto, or 1 to ").nth(1).unwrap().trim().parse().unwrap();
+    assert!((1..10).contains(&most), "{}", run.stderr);
+    for count in ["0", "-1", "many"] {
+        let run = render(count);
+        assert_eq!((run.code, run.errors()), (Some(2), 1), "{}", run.stderr);
+        assert!(run.stderr.contains("auto, or a number of frames of at least 1"), "{}", run.stderr);
+    }
+    assert_eq!(folder.names(), ["scene.toml"]);
+}

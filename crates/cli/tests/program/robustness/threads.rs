@@ -73,3 +73,26 @@ fn all_that_is_measured_of_a_phenomenon_is_the_same_by_any_number_of_threads() {
         }
     }
 }
+
+#[test]
+fn any_number_of_frames_in_flight_gives_the_same_files() {
+    let folder = Folder::with_scene(&scene("[[flame_sheet]]\n[sky]\n[[rain]]\nrate_mm_per_h = 30.0\n[ground]\n", ""));
+    for (count, threads) in [("1", "4"), ("3", "4"), ("40", "2"), ("auto", "5"), ("2", "1")] {
+        let work = ["--frames", "0-6", "--frames-in-flight", count, "--threads", threads];
+        for file in ["f.####.png", "f.####.exr", "film.apng"] {
+            let out = format!("{count}/{file}");
+            finish(&folder, count, &[&["render", "scene.toml", "--out", &out], &work[..]].concat());
+        }
+        let sheet = format!("{count}/sheet.png");
+        finish(
+            &folder,
+            count,
+            &[&["render", "scene.toml", "--contact-sheet", "7", "--out", &sheet], &work[..]].concat(),
+        );
+    }
+    let one = folder.files("1");
+    assert_eq!(one.len(), 16, "{:?}", one.keys());
+    for count in ["3", "40", "auto", "2"] {
+        assert!(folder.files(count) == one, "{count} frames in flight give other files");
+    }
+}
