@@ -256,7 +256,7 @@ def build(args):
     spots = on_ground(np.stack([r * np.cos(a), r * np.sin(a), np.full(n, 0.006)], axis=1))
     shapes.scatter("coals", coals, spots, rng.uniform(0, 6.3, n), rng.gamma(2.5, 0.36, n), rng.normal(0, 0.4, (n, 2)))
 
-    # Seats, a block with an axe, firewood.
+    # Seats, a block with an ax, firewood.
     log((-1.95, -0.55, 0.185), (-1.28, 1.20, 0.185), 0.195, log_bark, sawn, 0.012, 150)
     log((0.55, 1.72, 0.175), (2.25, 1.42, 0.175), 0.185, log_bark, sawn, 0.012, 150)
     log((1.52, -0.08, -0.02), (1.50, -0.06, 0.43), 0.175, log_bark, sawn, 0.012, 150, "block")
@@ -275,16 +275,16 @@ def build(args):
         split_log(wood, (x - c, y - s, 0.045), (x + c, y + s, 0.05), 0.075, seed, (0, 1, 2))
         seed += 1
     wood.build("firewood", smooth=True).data.set_sharp_from_angle(angle=0.7)
-    axe = Mesh(plain("handle", (0.28, 0.17, 0.08), 0.45), plain("steel", (0.20, 0.20, 0.21), 0.35, Metallic=0.9))
+    ax = Mesh(plain("handle", (0.28, 0.17, 0.08), 0.45), plain("steel", (0.20, 0.20, 0.21), 0.35, Metallic=0.9))
     t = np.linspace(0, 1, 16)
     handle = np.array([1.50, -0.05, 0.47]) + t[:, None] * np.array([0.40, 0.10, 0.40]) + 0.02 * np.sin(t * 5)[:, None] * np.array([-0.6, 0, 0.7])
-    axe.add(shapes.tube(handle, 0.016 + 0.004 * np.cos(t * 6), 12), 0)
+    ax.add(shapes.tube(handle, 0.016 + 0.004 * np.cos(t * 6), 12), 0)
     head = shapes.box((-0.10, -0.017, -0.045), (0.075, 0.017, 0.045), 0.008)
     v = head[0].copy()
     v[:, 1] *= np.where(v[:, 0] < -0.02, 0.25, 1.0)
     v[:, 2] *= np.where(v[:, 0] < -0.02, 1.35, 1.0)
-    axe.add(shapes.moved(shapes.rotated((v, head[1]), (0, 1, 0), -0.8), (1.51, -0.05, 0.46)), 1)
-    axe.build("axe", smooth=True).data.set_sharp_from_angle(angle=0.5)
+    ax.add(shapes.moved(shapes.rotated((v, head[1]), (0, 1, 0), -0.8), (1.51, -0.05, 0.46)), 1)
+    ax.build("ax", smooth=True).data.set_sharp_from_angle(angle=0.5)
     enamel = plain("enamel", (0.05, 0.10, 0.20), 0.2, Coat_Weight=0.5)
     mug = shapes.lathe([(0.0, 0.0), (0.038, 0.0), (0.041, 0.006), (0.041, 0.078), (0.043, 0.082), (0.039, 0.08), (0.038, 0.01), (0.0, 0.008)], 32)
     handle = np.array([0.041, 0, 0.065]) + np.stack([0.028 * np.sin(np.linspace(0, np.pi, 12)), 0 * np.linspace(0, 1, 12), -0.048 * np.linspace(0, 1, 12)], axis=1)
