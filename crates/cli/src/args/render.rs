@@ -108,7 +108,7 @@ pub(crate) struct RenderArgs {
     resume: bool,
     /// How many frames are drawn at once, where they do not follow from each other as in simulations: a number, or `auto`: one with fewer than 8 threads or
     /// over a plate, else up to one for each thread. The files are the same for any number.
-    #[arg(long, value_name = "auto|N", default_value = "auto", value_parser = values::parse_frames_in_flight, help_heading = "Work")]
+    #[arg(long, value_name = "auto|N", default_value = "auto", allow_hyphen_values = true, value_parser = values::parse_frames_in_flight, help_heading = "Work")]
     frames_in_flight: FramesInFlight,
     #[command(flatten)]
     states: StateArgs,

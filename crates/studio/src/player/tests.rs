@@ -59,7 +59,9 @@ fn rendered_with_alpha(text: &str, number: i64, opaque: bool) -> Vec<[u8; 4]> {
     let assets: Arc<dyn Assets> = Arc::new(MemoryAssets::default());
     let scene = Arc::new(parse_scene("scene", text).unwrap().with_options(&SceneOptions::default()).unwrap());
     let compiled = Arc::new(CompiledScene::build(scene, assets, None).unwrap());
-    let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
+    // As `bansho render` writes it for display.
+    let options = PlanOptions { glare: bansho::GlareUse::Always, ..PlanOptions::default() };
+    let plan = Plan::new(&compiled, &options).unwrap();
     let mut shot = Shot::open(compiled, Arc::new(plan));
     let mut frame = bansho::draw(&mut shot, number, &Unobserved).unwrap();
     frame.opaque = opaque;

@@ -245,12 +245,11 @@ pub(crate) fn check(
     }
     check_without_pixels(scene, compiled, plan)?;
     if let FramesInFlight::Count(count @ 2..) = request.in_flight {
-        let fits = |count: i64| {
-            let request = MemoryRequest { in_flight: FramesInFlight::Count(count as usize), ..request };
+        let fits = |count: usize| {
+            let request = MemoryRequest { in_flight: FramesInFlight::Count(count), ..request };
             memory::can_allocate(estimated_bytes(compiled, plan, request))
         };
-        if fits(1) {
-            let max = memory::largest_fitting_count(count as i64, fits) as usize;
+        if let Some(max) = (1..count).take_while(|count| fits(*count)).last() {
             return Err(OptionError::FramesInFlight { count, required_gib: bytes / GIB, max }.into());
         }
     }

@@ -92,8 +92,8 @@ fn sizes_of_nothing_and_of_a_billion_are_refused() {
 
 #[test]
 fn a_curve_that_falls_where_it_must_rise_is_refused() {
-    let error = refused(&format!("{FLAME}texture = {{ threshold = [[0, 0.5], [1, 0.2]] }}\n"), 3);
-    says(&error, &["scene.toml:14:", "threshold", "decreases between x = 0 and x = 1"]);
+    let error = refused(&format!("{FLAME}texture = {{ threshold_across = [[0, 0.5], [1, 0.2]] }}\n"), 3);
+    says(&error, &["scene.toml:14:", "threshold_across", "decreases between x = 0 and x = 1"]);
 }
 
 #[test]

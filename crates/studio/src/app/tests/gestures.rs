@@ -141,13 +141,15 @@ fn highest(harness: &mut Harness<'_, Studio>) -> (f32, f32) {
 #[test]
 fn rising_curves_stay_valid() {
     let mut harness = window(SCENE);
-    harness.get_by_label("Curves").click();
-    harness.run_steps(6);
-    let chart = harness.get_by_role_and_label(Role::Canvas, "V(w)  threshold").rect().shrink(4.0);
-    let at = chart.left_bottom() + vec2(0.6 * chart.width(), -0.42 * chart.height());
+    harness.get_all_by_label("texture").last().expect("the section").click();
+    harness.run_steps(12);
+    harness.get_by_role_and_label(Role::Canvas, "threshold across").scroll_to_me();
+    harness.run_steps(12);
+    let chart = harness.get_by_role_and_label(Role::Canvas, "threshold across").rect().shrink(4.0);
+    let at = chart.left_bottom() + vec2(0.82 * chart.width(), -0.45 * chart.height());
     for by in [0.5, -0.9] {
         drag(&mut harness, at, vec2(0.0, by * chart.height()));
-        assert!(text(&mut harness).contains("threshold = [["), "{}", text(&mut harness));
+        assert!(text(&mut harness).contains("threshold_across = [["), "{}", text(&mut harness));
         assert!(harness.state_mut().session().document.error().is_none(), "{}", text(&mut harness));
         undo(&mut harness);
     }

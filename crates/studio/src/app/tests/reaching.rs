@@ -73,8 +73,8 @@ fn curves_are_edited_on_top_of_the_picture() {
     assert!(viewport.contains_rect(chart), "{viewport} {chart}");
     let before = harness.state_mut().session().picture().map(|(picture, _)| picture.pixels.clone());
     let chart = chart.shrink(4.0);
-    // The point (0.6, 0.42). The chart's maximum is a quarter above the highest point, but within the bounds.
-    let at = chart.left_bottom() + vec2(0.6 * chart.width(), -0.42 * chart.height());
+    // The point (0.6, 0.55). The chart's maximum is a quarter above the highest point, but within the bounds.
+    let at = chart.left_bottom() + vec2(0.6 * chart.width(), -0.55 * chart.height());
     drag(&mut harness, at, vec2(0.0, 0.3 * chart.height()));
     assert!(text(&mut harness).contains("threshold = [["), "{}", text(&mut harness));
     let after = harness.state_mut().session().picture().map(|(picture, _)| picture.pixels.clone());

@@ -157,15 +157,15 @@ fn curves_are_edited_by_their_points() {
     harness.run_steps(12);
     let chart = harness.get_by_role_and_label(Role::Canvas, "sharpen").rect().shrink(4.0);
     let at = |[x, y]: [f32; 2]| chart.left_bottom() + vec2(x * chart.width(), -y * chart.height());
-    drag(&mut harness, at([0.4, 0.82]), vec2(0.0, 0.4 * chart.height()));
+    drag(&mut harness, at([0.36, 0.97]), vec2(0.0, 0.4 * chart.height()));
     let dragged = text(&mut harness);
     let line = dragged.lines().find(|line| line.contains("sharpen = ")).unwrap_or_default().to_owned();
-    assert!(line.contains("[0.4, 0.4") && !line.contains("0.82"), "{dragged}");
-    harness.hover_at(at([0.7, 1.0]));
+    assert!(line.contains("[0.36, 0.5") && !line.contains("0.97"), "{dragged}");
+    harness.hover_at(at([0.6, 1.0]));
     harness.step();
     for pressed in [true, false] {
         harness.event(Event::PointerButton {
-            pos: at([0.7, 1.0]),
+            pos: at([0.6, 1.0]),
             button: PointerButton::Secondary,
             pressed,
             modifiers: Modifiers::NONE,
@@ -173,7 +173,7 @@ fn curves_are_edited_by_their_points() {
         harness.step();
     }
     drawn(&mut harness);
-    assert!(!text(&mut harness).contains("[0.7, 1.0]"), "{}", text(&mut harness));
+    assert!(!text(&mut harness).contains("[0.6, 1.0]"), "{}", text(&mut harness));
     assert!(harness.state_mut().session().document.error().is_none());
 }
 
