@@ -59,9 +59,8 @@ const SHINING: &[Shining] = &[
         tolerance: 0.03,
     },
     Shining {
-        // Within 10 degrees of a panorama's pole, overlapping layers lose 4 to 20 % of their light.
         name: "a flame sheet",
-        tables: "[[flame_sheet]]\nposition = [0, -0.5, -4]\nwidth = 0.7\nheight = 1.2\nlight.scale = 0\ntexture.overlap = false\n",
+        tables: "[[flame_sheet]]\nposition = [0, -0.5, -4]\nwidth = 0.7\nheight = 1.2\nlight.scale = 0\n",
         tolerance: 0.05,
     },
     Shining {

@@ -59,7 +59,7 @@ crate::parameters! {
         near: f64 = 0.05, limits(Range::new(1e-4, 1e4)), unit("m");
         /// Lens shift: displacement of the view to the right and up, in picture heights, without rotating the camera. The principal point moves the other way.
         shift: [f64; 2] = [0.0, 0.0], limits(Range::new(-10.0, 10.0)), unit("picture heights");
-        /// Fraction of all light that lens and air scatter over the picture, up to some 10 degrees. The default is 0.03 for pictures and films for display, and 0 for
+        /// Fraction of all light that lens and air scatter over the picture, most of it within 2 degrees. The default is 0.03 for pictures and films for display, and 0 for
         /// flipbooks, live effects and `--view raw`; EXR files have glare only on request. 0.01 is a clean prime lens at night, 0.1 a dirty window.
         glare: Option<f64> = None, limits(Range::new(0.0, 0.5));
         /// Exposure time; half a frame if omitted.

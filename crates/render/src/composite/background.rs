@@ -24,7 +24,7 @@ pub(crate) struct Background<'a> {
     /// Exposed radiance and alpha.
     pub(crate) color: Option<&'a Image<4>>,
     /// Exposed radiance of what has been drawn, without that of the plate; `None` if it is not kept apart.
-    drawn: Option<&'a Image<4>>,
+    pub(crate) drawn: Option<&'a Image<4>>,
     /// Depth, m, in rows.
     depth: Option<&'a [f32]>,
     /// Layers and AOVs of what has been drawn; empty for a plate.
@@ -83,51 +83,21 @@ impl<'a> Background<'a> {
         }
     }
 
-    /// Colors in a row of `rect`. `buffer` holds them if any pixel of the row is in `bent`.
-    pub(crate) fn color_row<'b>(
-        &self,
+    /// Colors of `image`, one of those of a background, in a row of `rect`. `buffer` holds them if any pixel of the row is in `bent`.
+    pub(crate) fn row<'b>(
+        image: &'b Image<4>,
         rect: Rect,
         row: usize,
         bent: &BentPixels,
         buffer: &'b mut Vec<[f32; 4]>,
-    ) -> Option<&'b [[f32; 4]]>
-    where
-        'a: 'b,
-    {
-        Self::image_row(self.color?, rect, row, bent, buffer)
-    }
-
-    /// As [`color_row`](Self::color_row), without the light of the plate; `None` if it is not kept apart.
-    pub(crate) fn drawn_row<'b>(
-        &self,
-        rect: Rect,
-        row: usize,
-        bent: &BentPixels,
-        buffer: &'b mut Vec<[f32; 4]>,
-    ) -> Option<&'b [[f32; 4]]>
-    where
-        'a: 'b,
-    {
-        Self::image_row(self.drawn?, rect, row, bent, buffer)
-    }
-
-    fn image_row<'b>(
-        image: &'a Image<4>,
-        rect: Rect,
-        row: usize,
-        bent: &BentPixels,
-        buffer: &'b mut Vec<[f32; 4]>,
-    ) -> Option<&'b [[f32; 4]]>
-    where
-        'a: 'b,
-    {
+    ) -> &'b [[f32; 4]] {
         let y = rect.y + row;
         if bent.row(y).is_empty() {
-            return Some(&image.row(y)[rect.x..rect.right()]);
+            return &image.row(y)[rect.x..rect.right()];
         }
         buffer.resize(rect.width, [0.0; 4]);
         bent.read_row(rect.x, y, image.width(), image.pixels(), buffer);
-        Some(buffer)
+        buffer
     }
 
     /// Values of a plane of [`Background::channels`] in `rect`, as refracted by `bent`.
@@ -381,7 +351,7 @@ mod tests {
         let rect = Rect { x: 0, y: 0, width: 3, height: 2 };
         background.trace(rect, &mut bent);
         let mut row =
-            |row| background.color_row(rect, row, &bent, &mut buffer).unwrap().iter().map(|c| c[0]).collect::<Vec<_>>();
+            |row| Background::row(&color, rect, row, &bent, &mut buffer).iter().map(|c| c[0]).collect::<Vec<_>>();
         assert_eq!((row(0), row(1)), (vec![0.0, 1.0, 2.0], vec![3.0, 5.0, 5.0]));
     }
 

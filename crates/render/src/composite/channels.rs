@@ -9,7 +9,7 @@ use bansho_scene::PLATE_LAYER;
 
 use super::{
     accumulate::Accumulator,
-    background::BentPixels,
+    background::{Background, BentPixels},
     composition::{Composition, StripScratch},
 };
 
@@ -83,8 +83,9 @@ fn plate_layer(composition: &Composition, scratch: &mut StripScratch) -> [Vec<f3
     let StripScratch { accumulator, bent, row: buffer, .. } = scratch;
     let rect = accumulator.rect;
     let mut layer: [Vec<f32>; 4] = Default::default();
+    let Some(image) = composition.background.color else { return layer };
     for row in 0..rect.height {
-        let Some(plate) = composition.background.color_row(rect, row, bent, buffer) else { break };
+        let plate = Background::row(image, rect, row, bent, buffer);
         for (x, plate) in plate.iter().enumerate() {
             let through = accumulator.transmittance_at(row * rect.width + x);
             for c in 0..3 {

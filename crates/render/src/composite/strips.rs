@@ -15,6 +15,7 @@ use fearless_simd::{Level, dispatch};
 
 use super::{
     accumulate::Accumulator,
+    background::Background,
     channels::{channel_planes, channels},
     composition::{Composition, StripScratch},
 };
@@ -108,11 +109,13 @@ fn finish_strip(composition: &Composition, level: Level, scratch: &mut StripScra
         }
         if let Some(drawn) = pixels.drawn.get_mut(first..first + rect.width) {
             drawn.copy_from_slice(out);
-            if let Some(colors) = background.drawn_row(rect, row, bent, buffer) {
+            if let Some(image) = background.drawn {
+                let colors = Background::row(image, rect, row, bent, buffer);
                 add_background(accumulator, accumulated.clone(), level, colors, drawn);
             }
         }
-        if let Some(colors) = background.color_row(rect, row, bent, buffer) {
+        if let Some(image) = background.color {
+            let colors = Background::row(image, rect, row, bent, buffer);
             add_background(accumulator, accumulated.clone(), level, colors, out);
         }
         if let Some(hidden) = accumulator.hidden_alpha(accumulated.clone()) {

@@ -108,7 +108,9 @@ impl FlameSheet {
                 let is_flame = self.content() == SheetContent::Flame;
                 let top = if is_flame { self.height_fraction(t).min(1.0) } else { 1.0 };
                 let grid = SheetCells::new(&view.camera, &quad, &CellResolution { texels_up, top });
-                let height_pixels = (scale * quad.size.y).max(grid.map_or(0.0, |_| small_height(texels_up)));
+                // Never filtered further, also where cells cannot be used, as at the pole of a panorama: the texture is thresholded afterwards, and a mean that is
+                // thresholded is darker than the mean of what is thresholded.
+                let height_pixels = (scale * quad.size.y).max(small_height(texels_up));
                 let texture = flame.texture_source.filtered(height_pixels, &self.filter_cache);
                 let (samples, rect) = self.samples(flame, &texture, view, surroundings.wind, count, grid);
                 if !samples.is_empty() {

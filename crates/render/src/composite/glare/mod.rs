@@ -15,6 +15,8 @@
 mod point_spread;
 mod pyramid;
 
+use std::ops::Range;
+
 use bansho_base::{
     camera::Lens,
     frame::{Channel, Precision},
@@ -42,16 +44,15 @@ pub(crate) fn source_view(spread: &PointSpread, view: &View) -> View {
     if period(view).is_some() {
         return view.with_whole_window();
     }
+    let [x, end_x] = grown(window.x..window.right(), width, spread);
+    let [y, end_y] = grown(window.y..window.bottom(), height, spread);
+    view.clone().with_window(Rect { x, y, width: end_x - x, height: end_y - y })
+}
+
+/// The first pixel and the end of a side's pixels within reach of `pixels`, in whole blocks.
+fn grown(pixels: Range<usize>, side: usize, spread: &PointSpread) -> [usize; 2] {
     let (reach, block) = (spread.reach(), spread.largest_block());
-    let low = |first: usize| first.saturating_sub(reach) / block * block;
-    let high = |end: usize, side: usize| (end + reach).next_multiple_of(block).min(side);
-    let (x, y) = (low(window.x), low(window.y));
-    view.clone().with_window(Rect {
-        x,
-        y,
-        width: high(window.right(), width) - x,
-        height: high(window.bottom(), height) - y,
-    })
+    [pixels.start.saturating_sub(reach) / block * block, (pixels.end + reach).next_multiple_of(block).min(side)]
 }
 
 /// The region of the picture from which light reaches the window of a plan, in pixels of the picture with its overscan: larger than the window where the lens

@@ -325,7 +325,7 @@ fn add_mix(sum: &mut [f32; 4], near: [f32; 4], far: [f32; 4]) {
 mod tests {
     use bansho_base::math::simd::{self, VectorLevel};
 
-    use super::*;
+    use super::{super::grown, *};
 
     const SIZE: [usize; 2] = [220, 150];
 
@@ -392,16 +392,14 @@ mod tests {
     #[test]
     fn a_part_of_the_picture_has_the_same_bits_as_the_whole() {
         let image = picture(&[[110, 75], [3, 2], [219, 149], [60, 100], [61, 100]]);
-        let (reach, block) = (spread().reach(), spread().largest_block());
         for window in [
             Rect { x: 100, y: 70, width: 30, height: 17 },
             Rect { x: 0, y: 0, width: 11, height: 5 },
             Rect { x: 209, y: 140, width: 11, height: 10 },
         ] {
-            let low = [window.x, window.y].map(|first| first.saturating_sub(reach) / block * block);
-            let high = [(window.right(), SIZE[0]), (window.bottom(), SIZE[1])]
-                .map(|(end, side)| (end + reach).next_multiple_of(block).min(side));
-            let drawn = Rect { x: low[0], y: low[1], width: high[0] - low[0], height: high[1] - low[1] };
+            let [x, end_x] = grown(window.x..window.right(), SIZE[0], &spread());
+            let [y, end_y] = grown(window.y..window.bottom(), SIZE[1], &spread());
+            let drawn = Rect { x, y, width: end_x - x, height: end_y - y };
             let part = glare_of(&image, drawn, window, None);
             let expected = glare_of(&image, whole(), window, None);
             let bits =
