@@ -23,7 +23,9 @@ use bansho_base::{
     world::wind::{Wind, WindParameters},
 };
 
-use bansho_aurora::{Aurora, AuroraParameters, AuroraRun, ParticleParameters, RenderingParameters, Sampling};
+use bansho_aurora::{
+    Aurora, AuroraParameters, AuroraRun, ParticleParameters, RenderingParameters, Sampling, TrackModel,
+};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 const STRIP_ROWS: usize = 8;
@@ -34,10 +36,15 @@ const REACH: i64 = 3;
 const SIGMA: f64 = 1.2;
 
 fn run(sampling: Sampling) -> AuroraRun {
+    // Single photons are drawn by the rules of hard spheres.
+    let energy_deposition = match sampling {
+        Sampling::SinglePhotons => TrackModel::HardSphereAtmosphere,
+        Sampling::MeanProfile | Sampling::SingleCollisions => TrackModel::Fang2010,
+    };
     let parameters = AuroraParameters {
         energy_ev: Animated::from(10_000.0),
         particles: ParticleParameters { count: 120_000, ..ParticleParameters::default() },
-        rendering: RenderingParameters { sampling, ..RenderingParameters::default() },
+        rendering: RenderingParameters { sampling, energy_deposition, ..RenderingParameters::default() },
         ..AuroraParameters::default()
     };
     let aurora = Aurora::new(parameters, "aurora", 1, None, &MemoryAssets::default());
@@ -105,6 +112,8 @@ fn draw(criterion: &mut Criterion) {
     group.bench_function("profile", |bencher| bencher.iter(|| frame(black_box(&mean), &north)));
     let single = run(Sampling::SingleCollisions);
     group.bench_function("collisions", |bencher| bencher.iter(|| frame(black_box(&single), &north)));
+    let photons = run(Sampling::SinglePhotons);
+    group.bench_function("photons", |bencher| bencher.iter(|| frame(black_box(&photons), &north)));
     group.bench_function("naive: a Gaussian for each point", |bencher| {
         bencher.iter_custom(|iterations| {
             let start = Instant::now();

@@ -11,7 +11,7 @@ use bansho_base::{
 
 use super::{
     AuroraParameters,
-    parameters::{check_color_matching, check_energies},
+    parameters::{check_color_matching, check_energies, check_sampling},
     shapes::{Sequence, ShapeError, ShapeErrorKind},
     simulate::{AuroraSimulation, check_neighbors},
 };
@@ -84,6 +84,7 @@ impl Aurora {
         let crossfade_s = loop_s.map_or(Ok(0.0), |loop_s| close_loop(&mut parameters, loop_s))?;
         check_energies(&parameters)?;
         check_color_matching(&parameters)?;
+        check_sampling(&parameters)?;
         let lengths = sequence.arrivals().iter().map(|time| sequence.at(*time).length());
         check_neighbors(&parameters, lengths.fold(f64::INFINITY, f64::min))?;
         let crossing = sequence.crossing();

@@ -330,6 +330,9 @@ bansho_base::choice! {
         MeanProfile = "mean_profile",
         /// By single collisions, as in the thesis (2.4).
         SingleCollisions = "single_collisions",
+        /// By single photons, to the letter of the thesis (2.4.1, 2.4.2): every electron has a random path of its own, and for each collision one species, one
+        /// line and one quenching are drawn. Noisier than `single_collisions` and slower, with the same mean; needs `energy_deposition = "hard_sphere"`.
+        SinglePhotons = "single_photons",
     }
 }
 
@@ -434,6 +437,19 @@ pub(crate) fn check_color_matching(parameters: &AuroraParameters) -> Result<(), 
     if *color_matching == ColorMatching::Table21 && *energy_deposition != TrackModel::HardSphereAtmosphere {
         let key = "rendering.color_matching".to_owned();
         return Err(ShapeError { key, kind: ShapeErrorKind::LinesOutsideTable21 });
+    }
+    Ok(())
+}
+
+/// Checks that single photons are those of the thesis, whose rules are those of hard spheres.
+///
+/// # Errors
+///
+/// Single photons with another model of the energy loss.
+pub(crate) fn check_sampling(parameters: &AuroraParameters) -> Result<(), ShapeError> {
+    let RenderingParameters { sampling, energy_deposition, .. } = &parameters.rendering;
+    if *sampling == Sampling::SinglePhotons && *energy_deposition != TrackModel::HardSphereAtmosphere {
+        return Err(ShapeError { key: "rendering.sampling".to_owned(), kind: ShapeErrorKind::PhotonsWithoutSpheres });
     }
     Ok(())
 }

@@ -55,6 +55,7 @@
 //! | values that change over time | [`Animated`] |
 //! | pixels, depth, AOVs | [`Picture`]; for whole frames [`write_rgba16f`] and its kin |
 //! | light for other objects, particles, drops | [`LiveEffect::lights`], [`LiveEffect::particles`] |
+//! | statistics of pictures of flames | [`flame_statistics`] |
 //! | streak textures of any drop | [`rain::billboards::texture::StreakCube`] |
 //! | smoothed-particle hydrodynamics alone | [`sph`] |
 //! | a phenomenon of your own | [`base::phenomenon`] |
@@ -125,6 +126,7 @@
 use std::sync::Arc;
 
 pub mod effect;
+pub mod flame_statistics;
 #[cfg(feature = "files")]
 pub mod job;
 mod kinds;

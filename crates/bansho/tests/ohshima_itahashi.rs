@@ -14,6 +14,7 @@ use bansho::{
         frame::Frame,
         math::curve::{Curve, Interpolation},
     },
+    flame_statistics::{FlameMask, FlameStatistics},
     media::assets::FileAssets,
 };
 
@@ -238,120 +239,17 @@ fn the_finished_flame_is_mapped_by_equations_9_to_18() {
     }
 }
 
-/// Measurements by which flames can be judged and compared, over frames of a film.
-#[derive(Debug)]
-struct Judgment {
-    /// Height at which there is flame half of the time (Zukoski's flame height), as a fraction of the picture's.
-    height: f64,
-    /// Fraction of the outline's inside that is lit, in the lower third of that height.
-    body: f64,
-    /// Mean number of pieces that are apart from each other.
-    pieces: f64,
-    /// Mean of green over red at the edge of the pieces, as encoded, relative to that inside: below 1 the edges are redder.
-    edge_redness: f64,
-    /// Width of the lowest lit row relative to the greatest width: 1 for a flame that is cut off at its base.
-    base_width: f64,
-    /// Fraction of the lit pixels that are pale: with blue at least half as bright as red, as encoded.
-    pale: f64,
-    /// Mean lit area, as a fraction of the picture.
-    area: f64,
-}
-
-/// Side of the pictures that are judged.
-const SMALL: usize = 128;
-
-impl Judgment {
-    fn of(text: &str) -> Self {
-        let numbers: Vec<i64> = (0..24).map(|i| 10 * i + 3).collect();
-        let frames: Vec<Vec<[f64; 3]>> = render(text, [SMALL; 2], &numbers).iter().map(linear).collect();
-        let lit = |pixels: &[[f64; 3]]| pixels.iter().map(|pixel| pixel[0] > 0.02).collect::<Vec<bool>>();
-        let masks: Vec<Vec<bool>> = frames.iter().map(|frame| lit(frame)).collect();
-        let mean = |of: &dyn Fn(usize) -> f64| (0..masks.len()).map(of).sum::<f64>() / masks.len() as f64;
-        let lowest = |mask: &[bool]| (0..SMALL).rev().find(|row| extent(mask, *row).is_some()).unwrap();
-        let base = masks.iter().map(|mask| lowest(mask)).max().unwrap();
-        let is_flame_in = |row: usize| mean(&|i| f64::from(u8::from(extent(&masks[i], row).is_some())));
-        let top = (0..base).find(|row| is_flame_in(*row) >= 0.5).unwrap();
-        let lower_third = base - (base - top) / 3..base - 1;
-        Self {
-            height: (base - top) as f64 / SMALL as f64,
-            body: mean(&|i| filled(&masks[i], lower_third.clone())),
-            pieces: mean(&|i| pieces(&masks[i])),
-            edge_redness: mean(&|i| edge_redness(&frames[i], &masks[i])),
-            base_width: mean(&|i| {
-                let width = |row: usize| extent(&masks[i], row).map_or(0, |[left, right]| right + 1 - left);
-                width(lowest(&masks[i])) as f64 / (0..SMALL).map(width).max().unwrap() as f64
-            }),
-            pale: mean(&|i| {
-                let lit = (0..masks[i].len()).filter(|index| masks[i][*index]);
-                let pale = |index: &usize| encode(frames[i][*index][2].max(0.0)) > 0.5 * encode(frames[i][*index][0]);
-                lit.clone().filter(pale).count() as f64 / lit.count() as f64
-            }),
-            area: mean(&|i| masks[i].iter().filter(|lit| **lit).count() as f64 / (SMALL * SMALL) as f64),
-        }
-    }
-}
-
-/// First and last lit column of a row.
-fn extent(mask: &[bool], row: usize) -> Option<[usize; 2]> {
-    let row = &mask[row * SMALL..(row + 1) * SMALL];
-    Some([row.iter().position(|lit| *lit)?, row.iter().rposition(|lit| *lit)?])
-}
-
-/// Fraction of the pixels between the first and the last lit one of each row that are lit.
-fn filled(mask: &[bool], rows: std::ops::Range<usize>) -> f64 {
-    let (mut lit, mut all) = (0, 0);
-    for row in rows {
-        if let Some([left, right]) = extent(mask, row) {
-            lit += mask[row * SMALL + left..=row * SMALL + right].iter().filter(|lit| **lit).count();
-            all += right + 1 - left;
-        }
-    }
-    f64::from(lit as u32) / f64::from(all as u32)
-}
-
-fn neighbors(index: usize) -> impl Iterator<Item = usize> {
-    let (x, y) = (index % SMALL, index / SMALL);
-    let sides = [(x > 0).then(|| index - 1), (x + 1 < SMALL).then(|| index + 1)];
-    let ends = [(y > 0).then(|| index - SMALL), (y + 1 < SMALL).then(|| index + SMALL)];
-    sides.into_iter().chain(ends).flatten()
-}
-
-/// Number of connected pieces of at least four pixels.
-fn pieces(mask: &[bool]) -> f64 {
-    let (mut seen, mut count) = (vec![false; mask.len()], 0.0);
-    for start in 0..mask.len() {
-        let (mut size, mut open) = (0, vec![start]);
-        while let Some(index) = open.pop() {
-            if mask[index] && !seen[index] {
-                seen[index] = true;
-                size += 1;
-                open.extend(neighbors(index));
-            }
-        }
-        count += f64::from(u8::from(size >= 4));
-    }
-    count
-}
-
-/// Green over red at pixels beside dark ones, relative to that of pixels at least three pixels inside.
-fn edge_redness(pixels: &[[f64; 3]], mask: &[bool]) -> f64 {
-    let erode = |mask: &[bool]| -> Vec<bool> {
-        (0..mask.len()).map(|index| mask[index] && neighbors(index).all(|next| mask[next])).collect()
-    };
-    let (once, thrice) = (erode(mask), erode(&erode(&erode(mask))));
-    let ratio = |chosen: &dyn Fn(usize) -> bool| {
-        let found: Vec<f64> = (0..mask.len())
-            .filter(|index| chosen(*index))
-            .map(|index| encode(pixels[index][1].max(0.0)) / encode(pixels[index][0]))
-            .collect();
-        found.iter().sum::<f64>() / found.len() as f64
-    };
-    ratio(&|index| mask[index] && !once[index]) / ratio(&|index| thrice[index])
+/// Statistics of 24 frames of a flame, drawn small.
+fn judged(text: &str) -> FlameStatistics {
+    let numbers: Vec<i64> = (0..24).map(|i| 10 * i + 3).collect();
+    let masks: Vec<FlameMask> =
+        render(text, [128; 2], &numbers).iter().map(|frame| FlameMask::new(&frame.beauty)).collect();
+    FlameStatistics::new(&masks).unwrap()
 }
 
 #[test]
 fn the_four_flames_are_judged_to_be_flames_and_to_differ() {
-    let judgments: Vec<Judgment> = [5, 6, 7, 8].map(|picture| Judgment::of(&scene_text(picture))).into();
+    let judgments = [5, 6, 7, 8].map(|picture| judged(&scene_text(picture)));
     for (picture, flame) in (5..).zip(&judgments) {
         assert!(flame.body > 0.9, "picture {picture}: the body is closed at the base: {flame:?}");
         assert!(flame.edge_redness < 0.7, "picture {picture}: red edges, yellow core: {flame:?}");
@@ -359,7 +257,7 @@ fn the_four_flames_are_judged_to_be_flames_and_to_differ() {
         assert!(flame.pale < 0.35, "picture {picture}: orange rather than cream: {flame:?}");
         assert!((0.5..0.95).contains(&flame.height), "picture {picture}: {flame:?}");
     }
-    let [broad, tall, ragged, calm] = judgments.as_slice() else { panic!("four pictures") };
+    let [broad, tall, ragged, calm] = judgments;
     assert!([broad, tall, ragged].iter().all(|flame| flame.pieces > 1.5), "tongues break off");
     assert!(ragged.pieces > 1.3 * broad.pieces && calm.pieces < 0.7 * tall.pieces);
     assert!(broad.area > 1.4 * tall.area && ragged.height < 0.95 * broad.height.max(tall.height));
@@ -380,7 +278,7 @@ fn a_flame_that_is_cut_off_pale_and_full_of_holes_is_judged_so() {
         let line = text.lines().find(|line| line.starts_with(&format!("{key} = "))).unwrap().to_owned();
         text = text.replace(&line, &format!("{key} = {value}"));
     }
-    let flame = Judgment::of(&text);
+    let flame = judged(&text);
     assert!(flame.base_width > 0.75 && flame.body < 0.9 && flame.pale > 0.5, "{flame:?}");
 }
 

@@ -67,7 +67,7 @@ pub mod streaks;
 pub mod textured_billboards;
 
 pub use model::Rain;
-pub use parameters::{Method, OpacityLaw, RainParameters, SplashParameters, VelocityLaw};
+pub use parameters::{DropCountLaw, Method, OpacityLaw, RainParameters, SplashParameters, VelocityLaw};
 pub use raindrop::Raindrop;
 pub use run::RainRun;
 

@@ -39,6 +39,16 @@ bansho_base::choice! {
     }
 }
 
+bansho_base::choice! {
+    /// Number of the drops of one diameter in a texture.
+    pub enum DropCountLaw {
+        /// Those of its bin: n(D), which is per millimeter of diameter, integrated over the diameters halfway to the neighbors.
+        Bin = "bin",
+        /// n(D) itself, as section 4 of Yoshida, Dobashi & Yamamoto says. For the paper's bins of 0.2 mm these are five times as many drops.
+        Density = "density",
+    }
+}
+
 bansho_base::parameters! {
     /// Splashes of drops on the ground.
     pub struct SplashParameters {
@@ -63,6 +73,8 @@ bansho_base::parameters! {
         diameters_mm: Vec<f64> = PAPER_DIAMETERS_MM.to_vec(), limits(Length { min: 1, max: 12, item: Range::new(0.1, 8.0) }), unit("mm");
         /// Rain rates of the textures of `method = "textures"`, ascending; textures of the rate nearest to the rain rate are shown.
         texture_rates_mm_per_h: Vec<f64> = vec![1.0, 5.0, 10.0, 20.0], limits(Length { min: 1, max: 12, item: Range::new(0.1, 300.0) }), unit("mm/h");
+        /// Number of the drops of one diameter in a texture. Only used by `method = "textures"`.
+        texture_drop_count: DropCountLaw = DropCountLaw::Bin;
         /// Law of the terminal velocities.
         terminal_velocity: VelocityLaw = VelocityLaw::GunnKinzer;
         /// Distance from the camera up to which streaks are drawn; rain beyond it only contributes to the airlight.
@@ -88,5 +100,5 @@ bansho_base::parameters! {
         /// Splashes of drops on the ground.
         splashes: SplashParameters = SplashParameters::default();
     }
-    paper: texture_rates_mm_per_h, terminal_velocity, opacity, culling;
+    paper: texture_rates_mm_per_h, texture_drop_count, terminal_velocity, opacity, culling;
 }

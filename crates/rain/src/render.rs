@@ -99,7 +99,10 @@ impl<'a> PreparedRain<'a> {
             streaks.drops *= share;
             streaks.billboards *= share;
         }
-        streaks.billboards += textured.as_ref().map_or(0.0, |textured| textured.count() as f64);
+        if let Some(textured) = &textured {
+            streaks.billboards += textured.count() as f64;
+            streaks.drops += textured.drop_count() as f64;
+        }
         let end = if rain.parameters.airlight_distance > 0.0 { rain.near_reach() } else { 0.0 };
         let farthest = rain.reach(surroundings);
         let unlit = DropLighting { lights: &[], ..lighting };

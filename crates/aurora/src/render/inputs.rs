@@ -38,7 +38,7 @@ impl RenderTables {
     pub(crate) fn new(parameters: &AuroraParameters, emission: &Emission, max_energy_factor: f64, key: Key) -> Self {
         let rendering = &parameters.rendering;
         let attenuation = AttenuationByDistance::new(rendering.attenuation_per_km, parameters.dip_deg);
-        let collisions = (rendering.sampling == Sampling::SingleCollisions).then(|| {
+        let collisions = (rendering.sampling != Sampling::MeanProfile).then(|| {
             let max_energy_ev = (max_energy_factor * parameters.energy_ev.bounds()[1]).min(HIGHEST_EV);
             let highest_node = nearest_node(max_energy_ev) + SPECTRUM_NODES;
             CollisionRenderer::new(emission, rendering, &attenuation, highest_node, key)

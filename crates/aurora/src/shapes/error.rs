@@ -259,6 +259,11 @@ pub enum ShapeErrorKind {
         "table 2.1 has the five lines of the thesis only; allowed: `\"cie_1931\"`, or `energy_deposition = \"hard_sphere\"`, which emits these five"
     )]
     LinesOutsideTable21,
+    /// Single photons are drawn by the rules of the thesis, which are those of its hard spheres.
+    #[error(
+        "single photons are drawn by the rules of the thesis; allowed: `\"single_collisions\"`, or `energy_deposition = \"hard_sphere\"`"
+    )]
+    PhotonsWithoutSpheres,
     /// A loop whose length is not a positive number.
     #[error("a loop of {seconds} s is too short; allowed: more than 0 s")]
     LoopLength {

@@ -86,6 +86,12 @@ pub enum ParameterErrorKind {
         /// The other parameter and its value.
         other: &'static str,
     },
+    /// A file that another parameter requires is not stated.
+    #[error("must name a file where {other}")]
+    NoFile {
+        /// The other parameter and its value.
+        other: &'static str,
+    },
     /// A list that must ascend does not.
     #[error("must ascend, but {next} follows {value}")]
     NotAscending {

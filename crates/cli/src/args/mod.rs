@@ -19,7 +19,7 @@ pub(crate) use self::{
         TaskArgs, TaskCommand, ThreadArgs, TileArgs,
     },
     flipbook::FlipbookArgs,
-    plot::{ColorTexture, DeflectionArgs, KernelTexture, PlotArgs, PlotCommand, PlotOutputArgs},
+    plot::{ColorTexture, DeflectionArgs, FlameStatisticsArgs, KernelTexture, PlotArgs, PlotCommand, PlotOutputArgs},
     render::RenderArgs,
     shared::{InputArgs, ProgressKind, WorkArgs},
     simulate::SimulateArgs,

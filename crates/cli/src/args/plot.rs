@@ -66,6 +66,8 @@ pub(crate) enum PlotCommand {
     TransferCurves(TransferCurvesArgs),
     /// Thresholds, widths, speeds and edges of a flame sheet in a scene (Ohshima & Itahashi, figures 2, 6 and 7).
     FlameShape(FlameShapeArgs),
+    /// Height, lit area, pieces and pale part of the flame in a scene over its frames, by which flames can be compared (Ohshima & Itahashi, section 5).
+    FlameStatistics(FlameStatisticsArgs),
     /// The numbers of the JSON files that `bansho render --metadata` wrote, over the frames.
     Metadata(MetadataArgs),
 }
@@ -283,6 +285,21 @@ pub(crate) struct FlameShapeArgs {
     /// Height w of the horizontal section whose speed is plotted.
     #[arg(long, value_name = "W", default_value = "0.5", allow_hyphen_values = true, value_parser = parse_flame_height)]
     pub(crate) height: f64,
+    #[command(flatten)]
+    pub(crate) output: PlotOutputArgs,
+}
+
+/// `bansho plot flame-statistics`
+#[derive(Args, Debug)]
+pub(crate) struct FlameStatisticsArgs {
+    /// The scene file, which should show only the flame; `-` reads it from standard input.
+    pub(crate) scene: PathBuf,
+    /// Number of frames, evenly distributed over the shot.
+    #[arg(long, value_name = "N", default_value = "24", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(crate) frames: u32,
+    /// Height of the pictures that are measured, pixels.
+    #[arg(long, value_name = "PIXELS", default_value = "128", value_parser = clap::value_parser!(u32).range(16..=4320))]
+    pub(crate) height: u32,
     #[command(flatten)]
     pub(crate) output: PlotOutputArgs,
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bansho::{
     BitDepth,
     job::{StreakFormat, Streaks},
-    rain::{OpacityLaw, VelocityLaw, billboards::texture::StreakCube},
+    rain::{DropCountLaw, OpacityLaw, VelocityLaw, billboards::texture::StreakCube},
 };
 
 use super::{
@@ -55,6 +55,9 @@ pub(crate) struct StreaksArgs {
     /// Opacity of streaks: the fraction of the exposure during which the drop covers a point, or the paper's 2 D / v for lines of uniform opacity.
     #[arg(long, default_value = "exposure_fraction", value_parser = values::opacity_parser())]
     opacity: OpacityLaw,
+    /// Number of drops of a diameter: n(D) integrated over its bin, or n(D) itself as the paper says, per millimeter.
+    #[arg(long, default_value = "bin", value_parser = values::drop_count_parser())]
+    drop_count: DropCountLaw,
     /// Sample the diameter of each drop within its bin, from the drop size distribution.
     #[arg(long)]
     vary_diameter: bool,
@@ -96,6 +99,7 @@ impl StreaksArgs {
             size: self.size,
             exposure: self.exposure_time,
             opacity: self.opacity,
+            drop_count: self.drop_count,
             spread: self.vary_diameter,
             ..StreakCube::default()
         };

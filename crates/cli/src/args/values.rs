@@ -6,7 +6,7 @@ use bansho::{
     AlphaConvention, BitDepth, Rect, View, ViewName,
     job::frames::{self, FrameListError},
     job::{ContactBackground, FlipbookCrop, FramesInFlight, StreakFormat},
-    rain::{OpacityLaw, VelocityLaw},
+    rain::{DropCountLaw, OpacityLaw, VelocityLaw},
     scene::picture::LARGEST_SIDE,
 };
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -163,6 +163,11 @@ pub(super) fn parse_folder(text: &str) -> Result<PathBuf, ValueError> {
 pub(super) fn velocity_parser() -> impl TypedValueParser<Value = VelocityLaw> {
     let names = VelocityLaw::CHOICES.iter().map(|choice| choice.name);
     PossibleValuesParser::new(names).map(|name| VelocityLaw::from_name(&name).unwrap_or_default())
+}
+
+pub(super) fn drop_count_parser() -> impl TypedValueParser<Value = DropCountLaw> {
+    let names = DropCountLaw::CHOICES.iter().map(|choice| choice.name);
+    PossibleValuesParser::new(names).map(|name| DropCountLaw::from_name(&name).unwrap_or_default())
 }
 
 pub(super) fn opacity_parser() -> impl TypedValueParser<Value = OpacityLaw> {

@@ -18,12 +18,12 @@ use bansho::{
 };
 
 use crate::{
-    args::{DeflectionArgs, KernelTexture, Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
+    args::{DeflectionArgs, FlameStatisticsArgs, KernelTexture, Numbers, PlotArgs, PlotCommand, PlotOutputArgs},
     output::print,
     plot::{
         PlotError, aurora, beam, black_body, csv, draw,
         figure::Figure,
-        flame_shape, kernel, metadata, parameters, rain,
+        flame_shape, flame_statistics, kernel, metadata, parameters, rain,
         texture::{self, FigureTexture},
         transfer_curves,
     },
@@ -88,6 +88,7 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
             let figure = flame_shape::figure(&read(&args.scene)?, args.name.as_deref(), args.time, args.height)?;
             finish("flame-shape", &figure, &args.output, std::slice::from_ref(&args.scene))
         }
+        PlotCommand::FlameStatistics(args) => plot_flame_statistics(args),
         PlotCommand::Metadata(args) => finish("metadata", &metadata::figure(&args.files)?, &args.output, &args.files),
     }
 }
@@ -112,6 +113,15 @@ fn plot_deflection(args: &DeflectionArgs) -> anyhow::Result<()> {
         csv::number((1e3 * drawn.largest_pixels).round() * 1e-3),
         csv::number(drawn.full_scale_rad)
     ))?)
+}
+
+/// Plots statistics of a flame over the frames, and prints those of the film.
+fn plot_flame_statistics(args: &FlameStatisticsArgs) -> anyhow::Result<()> {
+    let FlameStatisticsArgs { scene, frames, height, output } = args;
+    let measured = flame_statistics::measure(&read(scene)?, *frames as usize, *height as usize)?;
+    finish("flame-statistics", &measured.figure, output, std::slice::from_ref(scene))?;
+    // Standard output has the table.
+    if output.out.as_deref() == Some(Path::new("-")) { Ok(()) } else { Ok(print(&measured.summary())?) }
 }
 
 /// The path of the figure called `name`.

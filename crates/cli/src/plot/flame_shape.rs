@@ -3,7 +3,7 @@
 use bansho::{
     BuildErrors, Scene,
     base::parameters::{BuildError, ParameterError},
-    fire::sheet::{FlameSheet, FlameSheetParameters, equations},
+    fire::sheet::{FlameSheet, FlameSheetParameters, TextureKind, TextureParameters, equations},
     job::{JobError, SceneFile},
 };
 
@@ -36,7 +36,10 @@ const COLUMNS: [&str; 10] = [
 pub(crate) fn figure(file: &SceneFile, name: Option<&str>, time: f64, height: f64) -> anyhow::Result<Figure> {
     let scene = file.parse()?;
     let (name, parameters) = flame_sheet(file, &scene, name)?;
-    let sheet = FlameSheet::new(parameters.clone(), &name, scene.seed, None);
+    // The shape does not depend on the texture, which may be a file.
+    let texture = TextureParameters { kind: TextureKind::Fractal, ..parameters.texture.clone() };
+    let shape_only = FlameSheetParameters { texture, ..parameters.clone() };
+    let sheet = FlameSheet::new(shape_only, &name, scene.seed, None);
     let sheet = sheet.map_err(|error| located(file, &scene, &name, error))?;
     let edges = sheet.edges(time);
     let mut table = FigureTable::new(COLUMNS);

@@ -1,7 +1,7 @@
 //! `bansho plot`: figures of what the models compute.
 //!
-//! [`figure`] describes a figure as plain data; [`black_body`], [`kernel`], [`rain`], [`beam`], [`aurora`], [`parameters`], [`transfer_curves`], [`flame_shape`] and
-//! [`metadata`] make one from the library's own functions. [`texture`] has pictures without axes. [`draw`] lays a figure out on a
+//! [`figure`] describes a figure as plain data; [`black_body`], [`kernel`], [`rain`], [`beam`], [`aurora`], [`parameters`], [`transfer_curves`], [`flame_shape`],
+//! [`flame_statistics`] and [`metadata`] make one from the library's own functions. [`texture`] has pictures without axes. [`draw`] lays a figure out on a
 //! [`canvas`], which writes SVG ([`svg`]) or pixels ([`raster`]); [`csv`] writes its table.
 
 pub(crate) mod aurora;
@@ -12,6 +12,7 @@ pub(crate) mod csv;
 pub(crate) mod draw;
 pub(crate) mod figure;
 pub(crate) mod flame_shape;
+pub(crate) mod flame_statistics;
 mod font;
 pub(crate) mod kernel;
 pub(crate) mod metadata;
@@ -69,6 +70,11 @@ pub(crate) enum PlotError {
         "{scene}: frame {frame} has no gas that refracts light; allowed: a scene of flame_particles whose `rendering.heat_haze_gain` is above 0"
     )]
     NoDeflection { scene: String, frame: i64 },
+    /// Frames without a lit pixel.
+    #[error(
+        "{scene}: none of {frames} frames has a lit pixel; allowed: a scene with a flame, whose `exposure_ev100` shows it"
+    )]
+    NoFlame { scene: String, frames: usize },
     /// A scene in which no phenomenon has that name.
     #[error("--name: {scene} has no {kind} `{name}`{hint}; allowed: {allowed}")]
     NoSuchName { scene: String, kind: &'static str, name: String, hint: String, allowed: String },
@@ -84,7 +90,7 @@ impl PlotError {
     /// Whose fault it is, for exit codes.
     pub(crate) fn category(&self) -> ErrorCategory {
         match self {
-            Self::NoPhenomenon { .. } | Self::NoDeflection { .. } => ErrorCategory::Scene,
+            Self::NoPhenomenon { .. } | Self::NoDeflection { .. } | Self::NoFlame { .. } => ErrorCategory::Scene,
             Self::NotMetadata { .. } | Self::NoNumbers { .. } => ErrorCategory::Work,
             _ => ErrorCategory::Usage,
         }

@@ -287,6 +287,27 @@ fn the_shape_of_a_flame_is_that_of_the_scene() {
 }
 
 #[test]
+fn statistics_of_a_flame_are_plotted_and_printed() {
+    let flame = "bansho = 2\n[picture]\nsize = [320, 180]\nframes = 60\n[sky]\nluminance = 0.0\n[[flame_sheet]]\n";
+    let folder = Folder::with_scene(flame);
+    let run = folder.succeed(&["plot", "flame-statistics", "scene.toml", "--frames", "4", "--height", "48", "-o", "-"]);
+    let table = Csv::parse(&run.stdout);
+    assert_eq!(table.columns, ["frame", "lit_height", "area", "pieces", "pale", "base_width", "edge_redness"]);
+    for frame in [0.0, 15.0, 30.0, 45.0] {
+        let row = table.row(frame);
+        assert!((0.3..=1.0).contains(&row[1]) && (0.02..0.5).contains(&row[2]) && row[3] >= 1.0, "{row:?}");
+    }
+    let run =
+        folder.succeed(&["plot", "flame-statistics", "scene.toml", "--frames", "2", "--height", "48", "-o", "a.svg"]);
+    assert!(run.stdout.contains("mean of 2 frames:") && run.stdout.contains("  pieces: "), "{}", run.stdout);
+    assert!(std::fs::read_to_string(folder.path("a.svg")).unwrap().contains("Lit area"));
+    let dark = Folder::with_scene(&flame.replace("[[flame_sheet]]", "[[flame_sheet]]\nflow = 0.0"));
+    let run = dark.run(&["plot", "flame-statistics", "scene.toml", "--frames", "1", "--height", "16"]);
+    assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+    assert!(run.stderr.contains("none of 1 frames has a lit pixel"), "{}", run.stderr);
+}
+
+#[test]
 fn metadata_are_plotted_over_the_frames() {
     let folder = Folder::new();
     for frame in 0..3 {

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use bansho_base::{
     camera::{Camera, upright_quad::right_facing},
-    host::{constructions, once::get_or_compute},
+    host::{assets::Picture, constructions, once::get_or_compute},
     math::{self, DVec2, DVec3, random::Key},
     parameters::{ParameterError, ParameterErrorKind},
 };
@@ -15,10 +15,12 @@ use super::{
         warp::{FlameWaves, WarpState, WindLean},
     },
     eddies::Eddies,
-    parameters::{ColorParameters, Facing, FlameSheetParameters, InstanceParameters, SheetMethod, TextureKind},
+    parameters::{
+        ColorParameters, Facing, FlameSheetParameters, InstanceParameters, SheetMethod, TextureKind, TextureParameters,
+    },
     soot_field::{self, SootFieldTables},
     tables::{color_ramp::ColorRamp, shape_tables::ShapeTables},
-    texture::{FilterCache, FractalLayers, PaperLayer, PaperSum, TextureSource},
+    texture::{FilterCache, FractalLayers, PaperSum, PeriodicLayer, TextureSource, paper_layer, picture_texels},
 };
 
 /// Fraction of full gas flow below which nothing is drawn: such a flame is less than a hundredth of its height.
@@ -48,6 +50,20 @@ impl FlameSheet {
         seed: u64,
         loop_s: Option<f64>,
     ) -> Result<Self, ParameterError> {
+        Self::with_picture(parameters, name, seed, loop_s, None)
+    }
+
+    /// The same with the picture of `texture.file`, which `texture.kind = "picture"` needs.
+    ///
+    /// # Errors
+    /// As those of [`new`](Self::new), or there is no picture although the texture is one.
+    pub fn with_picture(
+        parameters: FlameSheetParameters,
+        name: &str,
+        seed: u64,
+        loop_s: Option<f64>,
+        picture: Option<&Picture>,
+    ) -> Result<Self, ParameterError> {
         if let Some(seconds) = loop_s.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(ParameterError { key: "loop", kind: ParameterErrorKind::LoopLength { seconds } });
         }
@@ -56,7 +72,8 @@ impl FlameSheet {
         ShapeTables::check(&parameters.shape)?;
         ColorRamp::check(&parameters.texture)?;
         soot_field::check(&parameters)?;
-        let flames = flames(&parameters, name, seed, &clock);
+        let common_texture = common_texture(&parameters.texture, picture, &clock)?;
+        let flames = flames(&parameters, name, seed, common_texture.as_ref(), &clock);
         Ok(Self {
             name: name.to_owned(),
             parameters,
@@ -224,13 +241,34 @@ impl FlameSheet {
     }
 }
 
+/// The texture that all instances of a flame have in common; `None` for the fractal, whose layers differ.
+fn common_texture(
+    texture: &TextureParameters,
+    picture: Option<&Picture>,
+    clock: &Clock,
+) -> Result<Option<TextureSource>, ParameterError> {
+    let octaves = texture.octaves as u32;
+    let periodic = |layer: PeriodicLayer| Some(TextureSource::Periodic(Arc::new(layer)));
+    Ok(match texture.kind {
+        TextureKind::Fractal => None,
+        TextureKind::OhshimaItahashi => periodic(paper_layer(octaves, clock)),
+        TextureKind::OhshimaItahashiExact => Some(TextureSource::Exact(PaperSum::new(octaves, clock))),
+        TextureKind::Picture => {
+            let kind = ParameterErrorKind::NoFile { other: "`texture.kind` is \"picture\"" };
+            let picture = picture.ok_or(ParameterError { key: "texture.file", kind })?;
+            periodic(PeriodicLayer::new(&picture_texels(picture), texture.picture_size, clock))
+        }
+    })
+}
+
 /// The flames at all placements.
-fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Clock) -> Vec<FlameInstance> {
-    let texture = &parameters.texture;
-    let paper = (texture.kind == TextureKind::OhshimaItahashi)
-        .then(|| Arc::new(PaperLayer::new(texture.octaves as u32, clock)));
-    let exact =
-        (texture.kind == TextureKind::OhshimaItahashiExact).then(|| PaperSum::new(texture.octaves as u32, clock));
+fn flames(
+    parameters: &FlameSheetParameters,
+    name: &str,
+    seed: u64,
+    common_texture: Option<&TextureSource>,
+    clock: &Clock,
+) -> Vec<FlameInstance> {
     let placements = if parameters.instances.is_empty() {
         vec![InstanceParameters::default()]
     } else {
@@ -239,13 +277,10 @@ fn flames(parameters: &FlameSheetParameters, name: &str, seed: u64, clock: &Cloc
     let mut flames = Vec::with_capacity(placements.len());
     for (index, placement) in placements.into_iter().enumerate() {
         let key = instance_key(seed, name, parameters.variation, index);
-        let texture_source = match (&paper, exact) {
-            (Some(layer), _) => TextureSource::Paper(layer.clone()),
-            (_, Some(sum)) => TextureSource::Exact(sum),
-            _ => TextureSource::Fractal(
-                FractalLayers::new(tongue_size(parameters), 1.0, key, clock).overlapping(texture.overlap),
-            ),
-        };
+        let texture_source = common_texture.cloned().unwrap_or_else(|| {
+            let layers = FractalLayers::new(tongue_size(parameters), 1.0, key, clock);
+            TextureSource::Fractal(layers.overlapping(parameters.texture.overlap))
+        });
         let waves = FlameWaves::new(&parameters.shape, key, clock);
         let eddies = Eddies::new(parameters, key, clock);
         flames.push(FlameInstance { placement, key, waves, texture_source, eddies });

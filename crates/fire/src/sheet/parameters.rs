@@ -2,7 +2,7 @@
 
 use bansho_base::{
     math::curve::{Curve, Interpolation},
-    parameters::{Auto, CurveLimits, Length, Range, animated::Animated},
+    parameters::{AssetPath, Auto, CurveLimits, Length, Range, animated::Animated},
 };
 
 use crate::sparks::SparkParameters;
@@ -24,6 +24,8 @@ bansho_base::choice! {
         OhshimaItahashi = "ohshima_itahashi",
         /// The same sum, evaluated at every pixel instead of looked up in a filtered table, as in the paper: slower, and not antialiased.
         OhshimaItahashiExact = "ohshima_itahashi_exact",
+        /// A picture, section 3.1 of the paper: the gray levels of `file`, which repeats across and up.
+        Picture = "picture",
     }
 }
 
@@ -89,6 +91,9 @@ bansho_base::parameters! {
         slowing: Curve = curve(&[[0.0, 0.0], [0.5, 0.4], [1.0, 1.0]]), limits(CurveLimits::default().rising());
         /// Strength of P, eq. (15): how far the edge moves into the fringe. At 0 it stays at the outer edge.
         flutter: f64 = 0.3, limits(FRACTION);
+        /// P, eq. (15), along one wave of the edge, instead of a random one: 1 is the outer edge of the fringe, 0 the inner. It repeats, so that its ends should
+        /// agree; on the left it is half a wave later. `flutter` is its strength, and `flutter_waves` the number of its waves.
+        flutter_curve: Option<Curve> = None, limits(CurveLimits::default());
         /// B(x), height of what burns as a function of x, in sheet heights. It hides the flame below; it is itself not drawn.
         fuel_outline: Curve = curve(&[[0.0, 0.0], [1.0, 0.0]]), limits(CurveLimits::default());
         /// How much the columns of the texture follow the outline: at 1 they are squeezed and spread with it, eq. (16), and meet where it closes; at 0 they
@@ -120,6 +125,11 @@ bansho_base::parameters! {
     pub struct TextureParameters {
         /// Kind of texture.
         kind: TextureKind = TextureKind::Fractal;
+        /// The picture of `kind = "picture"`: gray levels from 0 to 1 (the codes of a PNG or JPEG as fractions of the largest, the numbers of an EXR file), which
+        /// are best distributed uniformly. It is resampled to 256 x 512 values.
+        file: Option<AssetPath> = None;
+        /// Width and height that the picture covers before it repeats, in sheet widths and heights.
+        picture_size: [f64; 2] = [1.0, 1.0], limits(Range::new(0.05, 20.0));
         /// Whether the two layers of the fractal texture are flames one behind the other, each with its own threshold and tongues, whose soot adds; else they
         /// are mixed into one.
         overlap: bool = true;
@@ -143,7 +153,7 @@ bansho_base::parameters! {
         sharpen: Curve = curve(&[[0.0, 0.0], [0.02, 0.18], [0.07, 0.44], [0.16, 0.68], [0.36, 0.97], [0.6, 1.0], [1.0, 0.93]]),
             limits(CurveLimits::default());
     }
-    paper: kind, octaves;
+    paper: kind, octaves, file, picture_size;
 }
 
 bansho_base::parameters! {

@@ -3,7 +3,10 @@
 use std::{any::Any, sync::Arc};
 
 use bansho_base::{
-    host::observer::{Cancelled, Observer, check},
+    host::{
+        assets::{Assets, Picture},
+        observer::{Cancelled, Observer, check},
+    },
     math::{self, DVec3},
     parameters::{BuildError, Parameter},
     phenomenon::{
@@ -76,7 +79,8 @@ impl PhenomenonTable for FlameSheetParameters {
     }
 
     fn build(&self, context: &BuildContext) -> Result<Arc<dyn Phenomenon>, BuildError> {
-        match FlameSheet::new(self.clone(), context.name, context.seed, context.loop_s) {
+        let picture = self.texture_picture(context.assets)?;
+        match FlameSheet::with_picture(self.clone(), context.name, context.seed, context.loop_s, picture.as_deref()) {
             Ok(mut sheet) => {
                 if let Some(previous) = context.previous.and_then(|previous| previous.as_any()?.downcast_ref()) {
                     sheet.share_tables(previous);
@@ -85,6 +89,15 @@ impl PhenomenonTable for FlameSheetParameters {
             }
             Err(error) => Err(BuildError::new(error.key, error.kind)),
         }
+    }
+}
+
+impl FlameSheetParameters {
+    /// The picture that is the texture, if one is.
+    fn texture_picture(&self, assets: &dyn Assets) -> Result<Option<Arc<Picture>>, BuildError> {
+        let file = self.texture.file.as_ref().filter(|_| self.texture.kind == TextureKind::Picture);
+        let picture = file.map(|file| assets.picture(&file.0, 0)).transpose();
+        picture.map_err(|error| BuildError { key: "texture.file".into(), kind: error.into() })
     }
 }
 
@@ -113,10 +126,12 @@ impl Phenomenon for FlameSheet {
             SheetMethod::FlameTexture => 3.2e5,
             SheetMethod::SootField => 1.2e7,
         };
-        let is_paper = self.parameters.texture.kind == TextureKind::OhshimaItahashi;
-        // Its texture, and a filtered one for each flame.
-        let paper = if is_paper { TABLE_BYTES * (1 + self.flames.len()) as f64 } else { 0.0 };
-        tables + paper + 0.5 * pixels
+        // The paper's texture or a picture, and a filtered one for each flame.
+        let own_texture = match self.parameters.texture.kind {
+            TextureKind::OhshimaItahashi | TextureKind::Picture => TABLE_BYTES * (1 + self.flames.len()) as f64,
+            TextureKind::Fractal | TextureKind::OhshimaItahashiExact => 0.0,
+        };
+        tables + own_texture + 0.5 * pixels
     }
 
     fn shared_memory(&self, view: &View) -> Vec<SharedMemory> {

@@ -2,8 +2,11 @@
 
 use bansho_base::{
     camera::{CameraParameters, Lens},
-    host::observer::Unobserved,
-    image::Rect,
+    host::{
+        assets::{Encoding, Picture},
+        observer::Unobserved,
+    },
+    image::{Image, Rect},
     math::{
         self,
         curve::{Curve, Interpolation},
@@ -199,19 +202,21 @@ fn wide_vectors_give_the_bits_of_narrow_ones() {
     assert_eq!(a, b);
 }
 
+/// Red light of a sheet in still air.
+fn red_in_still_air(sheet: &FlameSheet, t: f64) -> Vec<f32> {
+    let wind = Wind::new(WindParameters::default(), 1, None);
+    let calm = Surroundings::from_wind(&wind);
+    let view = view(Lens::Perspective, t);
+    let mut strip = Strip::default();
+    strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
+    sheet.prepare(&view, &calm, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
+    strip.radiance[0].clone()
+}
+
 #[test]
 fn a_seamless_loop_ends_where_it_began() {
     let sheet = sheet(rich(), Some(3.0));
-    let planes = |t| {
-        let wind = Wind::new(WindParameters::default(), 1, None);
-        let calm = Surroundings::from_wind(&wind);
-        let view = view(Lens::Perspective, t);
-        let mut strip = Strip::default();
-        strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
-        sheet.prepare(&view, &calm, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
-        strip.radiance[0].clone()
-    };
-    let (first, next) = (planes(0.4), planes(3.4));
+    let [first, next] = [0.4, 3.4].map(|t| red_in_still_air(&sheet, t));
     let most = first.iter().copied().fold(0.0, f32::max);
     assert!(most > 0.0);
     first.iter().zip(&next).for_each(|(a, b)| assert!((a - b).abs() < 0.01 * most, "{a} {b}"));
@@ -270,6 +275,44 @@ fn gas_moves_up_in_the_motion_aov_and_is_hot() {
     assert!(planes[9][bright] > 0.0 && planes[11][bright] < -0.1, "{} {}", planes[9][bright], planes[11][bright]);
     let dark = (0..planes[0].len()).find(|i| planes[0][*i] == 0.0).unwrap();
     assert_eq!((planes[8][dark], planes[11][dark]), (0.0, 0.0));
+}
+
+#[test]
+fn a_picture_of_the_texture_gives_the_flame_of_the_texture() {
+    use std::f64::consts::PI;
+    const PICTURE: [usize; 2] = [1024, 2048];
+    let period = [PI / 4.0, 2.0 * PI / 13.0];
+    // Rows count from the top.
+    let p: Vec<f64> = (0..PICTURE[0]).map(|x| (x as f64 + 0.5) / PICTURE[0] as f64 * period[0]).collect();
+    let q: Vec<f64> = (0..PICTURE[1]).map(|y| (1.0 - (y as f64 + 0.5) / PICTURE[1] as f64) * period[1]).collect();
+    let texture = PaperTexture::new(&p, &q, 5);
+    let mut pixels = Vec::new();
+    let mut row = vec![0.0; PICTURE[0]];
+    for y in 0..PICTURE[1] {
+        texture.fill_row(y, &mut row);
+        pixels.extend(row.iter().map(|level| [*level, *level, *level, 1.0]));
+    }
+    let picture = Picture::opaque(Image::from_pixels(PICTURE[0], PICTURE[1], pixels).unwrap(), Encoding::LinearAcescg);
+    let mut parameters = FlameSheetParameters { time_samples: Auto::Set(1), ..FlameSheetParameters::default() };
+    parameters.texture.kind = TextureKind::OhshimaItahashi;
+    let of_formula = sheet(parameters.clone(), Some(2.0));
+    parameters.texture.kind = TextureKind::Picture;
+    parameters.texture.picture_size = period;
+    let of_picture = FlameSheet::with_picture(parameters.clone(), "test", 5, Some(2.0), Some(&picture)).unwrap();
+    for t in [0.3, 1.2] {
+        let [formula, drawn] =
+            [&of_formula, &of_picture].map(|sheet| draw(sheet, &view(Lens::Perspective, t), 80, None));
+        let brightest = formula[1].iter().copied().fold(0.0, f32::max);
+        let difference = formula[1].iter().zip(&drawn[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(brightest > 100.0 && difference < 0.01 * brightest, "{difference} of {brightest}");
+    }
+    // The loop closes, and without a picture there is no flame.
+    let [start, end] = [0.4, 2.4].map(|t| red_in_still_air(&of_picture, t));
+    let brightest = start.iter().copied().fold(0.0, f32::max);
+    let difference = start.iter().zip(&end).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(brightest > 100.0 && difference < 0.01 * brightest, "{difference} of {brightest}");
+    let fault = FlameSheet::new(parameters, "test", 5, None).unwrap_err();
+    assert_eq!(fault.to_string(), "texture.file: must name a file where `texture.kind` is \"picture\"");
 }
 
 #[test]

@@ -46,7 +46,7 @@ use crate::{
         terminal_velocity::TerminalVelocity,
     },
     lighting::drop_phase_function::DropPhaseFunction,
-    parameters::OpacityLaw,
+    parameters::{DropCountLaw, OpacityLaw},
     streaks::{
         coverage::{Streak, paper_opacity},
         oscillation::Oscillation,
@@ -67,6 +67,8 @@ pub struct StreakCube {
     pub terminal_velocity: TerminalVelocity,
     /// Opacity of streaks.
     pub opacity: OpacityLaw,
+    /// Number of the drops of a bin.
+    pub drop_count: DropCountLaw,
     /// Whether each drop has its own random diameter within its bin, instead of the bin's.
     pub spread: bool,
 }
@@ -79,6 +81,7 @@ impl Default for StreakCube {
             exposure: 1.0 / 30.0,
             terminal_velocity: TerminalVelocity::default(),
             opacity: OpacityLaw::default(),
+            drop_count: DropCountLaw::default(),
             spread: false,
         }
     }
@@ -139,7 +142,13 @@ impl StreakCube {
 
     /// Expected number of drops of a bin in the cube.
     pub fn mean_count(&self, sizes: &DropSizeDistribution, bin: &SizeBin) -> f64 {
-        bin.count(sizes) * self.edge * self.edge * self.edge
+        /// The unit of n(D), mm.
+        const UNIT_OF_DENSITY_MM: f64 = 1.0;
+        let per_cubic_meter = match self.drop_count {
+            DropCountLaw::Bin => bin.count(sizes),
+            DropCountLaw::Density => sizes.density(bin.diameter_mm) * UNIT_OF_DENSITY_MM,
+        };
+        per_cubic_meter * self.edge * self.edge * self.edge
     }
 
     /// The drops of one bin. Variants are other random drops of the same rain; the mean over all variants is the

@@ -48,6 +48,8 @@ pub(crate) struct StreakTexture {
     /// Means of codes, times 256.
     mipmaps: Vec<Vec<u16>>,
     largest: u8,
+    /// Drops that it shows.
+    drop_count: usize,
 }
 
 impl TextureSet {
@@ -57,21 +59,31 @@ impl TextureSet {
     /// Diameters or rates that do not occur in rain.
     pub fn new(parameters: &RainParameters, seed: u64) -> Result<Self, StreakTextureError> {
         let terminal_velocity = TerminalVelocity { law: parameters.terminal_velocity, air: FallAir::default() };
-        let cube =
-            StreakCube { exposure: EXPOSURE, terminal_velocity, opacity: parameters.opacity, ..StreakCube::default() };
+        let cube = StreakCube {
+            exposure: EXPOSURE,
+            terminal_velocity,
+            opacity: parameters.opacity,
+            drop_count: parameters.texture_drop_count,
+            ..StreakCube::default()
+        };
         let bins = SizeBin::around(&parameters.diameters_mm);
-        let pictures: Vec<Vec<Image<1>>> = parameters
+        let draw = |sizes: &DropSizeDistribution, bin: &SizeBin| {
+            let drops = cube.drops(sizes, bin, seed, 0)?;
+            Ok((cube.draw(&drops)?, drops.len()))
+        };
+        let pictures: Vec<Vec<(Image<1>, usize)>> = parameters
             .texture_rates_mm_per_h
             .iter()
             .map(|rate| {
                 let sizes = DropSizeDistribution::marshall_palmer(*rate);
-                bins.iter().map(|bin| cube.draw(&cube.drops(&sizes, bin, seed, 0)?)).collect()
+                bins.iter().map(|bin| draw(&sizes, bin)).collect()
             })
             .collect::<Result<_, StreakTextureError>>()?;
-        let values = pictures.iter().flatten().flat_map(|picture| picture.pixels().as_flattened());
+        let values = pictures.iter().flatten().flat_map(|(picture, _)| picture.pixels().as_flattened());
         let scale = values.copied().fold(f32::MIN_POSITIVE, f32::max);
-        let textures =
-            pictures.iter().map(|row| row.iter().map(|picture| StreakTexture::new(picture, scale)).collect());
+        let textures = pictures
+            .iter()
+            .map(|row| row.iter().map(|(picture, drops)| StreakTexture::new(picture, scale, *drops)).collect());
         Ok(Self { rates: parameters.texture_rates_mm_per_h.clone(), textures: textures.collect(), scale })
     }
 
@@ -99,7 +111,7 @@ impl TextureSet {
 }
 
 impl StreakTexture {
-    fn new(picture: &Image<1>, scale: f32) -> Self {
+    fn new(picture: &Image<1>, scale: f32, drop_count: usize) -> Self {
         let opacities = picture.pixels().as_flattened().iter();
         let codes: Vec<u8> = opacities.map(|opacity| (opacity / scale * 255.0 + 0.5) as u8).collect();
         let mut mipmaps = Vec::new();
@@ -116,12 +128,17 @@ impl StreakTexture {
             (finer, side) = (coarser, half);
         }
         let largest = codes.iter().copied().max().unwrap_or(0);
-        Self { codes, size: picture.width(), mipmaps, largest }
+        Self { codes, size: picture.width(), mipmaps, largest, drop_count }
     }
 
     /// The largest code of its pixels.
     pub(crate) fn largest(&self) -> u8 {
         self.largest
+    }
+
+    /// Drops that it shows.
+    pub(crate) fn drop_count(&self) -> usize {
+        self.drop_count
     }
 
     /// The mipmap for a pixel that covers `texels` texels; 0 is the texture itself.

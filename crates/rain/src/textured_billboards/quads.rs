@@ -222,6 +222,11 @@ impl<'a> TexturedBillboards<'a> {
         self.quads.len()
     }
 
+    /// Drops that they show.
+    pub(crate) fn drop_count(&self) -> usize {
+        self.quads.iter().map(|quad| quad.texture.drop_count()).sum()
+    }
+
     /// Draws the billboards whose centers are in a slice.
     pub(crate) fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let rect = strip.rect;

@@ -10,7 +10,7 @@ use super::{
     quads::{Quad, heights, interpolated},
 };
 use crate::{
-    Method, OpacityLaw, RainParameters, VelocityLaw,
+    DropCountLaw, Method, OpacityLaw, RainParameters, VelocityLaw,
     streaks::coverage::paper_opacity,
     tests::{METHODS, draw, lamp, lit, opacity, rain, streaks, view_at, wind},
 };
@@ -37,6 +37,25 @@ fn the_papers_set_is_24_textures_in_6_291_456_bytes() {
     assert!(set.of_rate(0.0).is_empty());
     let first = |rate: f64| std::ptr::from_ref(&set.of_rate(rate)[0]);
     assert!(first(2.9) == first(1.0) && first(3.1) == first(5.0) && first(90.0) == first(20.0), "the nearest rate");
+}
+
+#[test]
+fn textures_hold_the_drops_of_a_bin_or_of_the_printed_density() {
+    let counts = |texture_drop_count, rate: f64| -> Vec<usize> {
+        let set = TextureSet::new(&RainParameters { texture_drop_count, ..paper(rate) }, 1).unwrap();
+        set.of_rate(rate).iter().map(super::StreakTexture::drop_count).collect()
+    };
+    let printed = |rate: f64, diameter: f64| 8000.0 * (-4.1 * rate.powf(-0.21) * diameter).exp();
+    for rate in [1.0, 5.0, 10.0, 20.0] {
+        for (count, diameter) in counts(DropCountLaw::Density, rate).iter().zip([1.0, 1.2, 1.4, 1.6, 1.8, 2.0]) {
+            assert!((*count as f64 - printed(rate, diameter)).abs() <= 1.0, "{rate} {diameter}: {count}");
+        }
+    }
+    // n(R, 2.0 mm) at 1 mm/h is 2.2 drops; the integral over 0.2 mm is 0.44.
+    assert!(counts(DropCountLaw::Density, 1.0)[5] >= 2 && counts(DropCountLaw::Bin, 1.0)[5] <= 1);
+    let [bins, densities] =
+        [DropCountLaw::Bin, DropCountLaw::Density].map(|law| counts(law, 20.0).iter().sum::<usize>());
+    assert!((472..=478).contains(&bins) && (2350..=2360).contains(&densities), "{bins} {densities}");
 }
 
 #[test]

@@ -4,8 +4,12 @@
 //! Keys in sub-tables are separated by dots.
 
 use bansho::{
-    AuroraParameters, FlameParticlesParameters, FlameSheetParameters, base::tables::PhenomenonTable,
-    fire::sheet::SheetStage,
+    AuroraParameters, FlameParticlesParameters, FlameSheetParameters,
+    base::tables::PhenomenonTable,
+    fire::{
+        particles::{GasModel, WindForce},
+        sheet::SheetStage,
+    },
 };
 
 /// Hints for the studio.
@@ -19,6 +23,22 @@ pub(crate) struct EditorHints {
     pub(crate) mesh_import: Option<MeshImport>,
     /// Its intermediate stages.
     pub(crate) stages: Option<Stages>,
+    /// The scale of the wind for these parameters; `None` for a velocity, m/s.
+    pub(crate) wind: Option<fn(&dyn PhenomenonTable) -> Option<WindScale>>,
+}
+
+/// A wind that bends a phenomenon strongly, but does not flatten it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct WindScale {
+    /// Magnitude of `wind.velocity`.
+    pub(crate) strong: f64,
+    /// Its unit.
+    pub(crate) unit: &'static str,
+}
+
+impl WindScale {
+    /// Wind is the velocity of air.
+    pub(crate) const VELOCITY: Self = Self { strong: 8.0, unit: "m/s" };
 }
 
 /// The upper limit of an integer parameter in a draft.
@@ -71,7 +91,8 @@ pub(crate) struct StageView {
     pub(crate) white_luminance: Option<f64>,
 }
 
-const NONE: EditorHints = EditorHints { draft_limits: &[], position_handles: None, mesh_import: None, stages: None };
+const NONE: EditorHints =
+    EditorHints { draft_limits: &[], position_handles: None, mesh_import: None, stages: None, wind: None };
 
 const FLAME_SHEET: EditorHints = EditorHints {
     position_handles: Some(PositionHandles { key: "position", items: "instances" }),
@@ -83,6 +104,7 @@ const FLAME_PARTICLES: EditorHints = EditorHints {
     draft_limits: &[DraftLimit { key: "particles", max: 4_000 }],
     position_handles: Some(PositionHandles { key: "position", items: "burners" }),
     mesh_import: Some(MeshImport { list: "burners", shape_key: "shape", shape: "mesh", file_key: "file" }),
+    wind: Some(flame_particles_wind),
     ..NONE
 };
 
@@ -107,6 +129,17 @@ fn flame_sheet_stage(parameters: &dyn PhenomenonTable) -> Option<StageView> {
     let highest = sheet.color.luminance.bounds()[1].max(f64::MIN_POSITIVE);
     let is_gray = !matches!(sheet.stage, SheetStage::Colored | SheetStage::Flame);
     Some(StageView { size_m: [sheet.width, sheet.height], white_luminance: is_gray.then_some(highest) })
+}
+
+/// Inagaki et al. take the drag of the pointer as a force per volume.
+fn flame_particles_wind(parameters: &dyn PhenomenonTable) -> Option<WindScale> {
+    /// Half as much again as in the scenes of the paper's figures 9 and 10, N/m^3.
+    const STRONG_FORCE: f64 = 0.1;
+    let flame: &FlameParticlesParameters = parameters.as_any().downcast_ref()?;
+    let is_force = flame.gas_model == GasModel::Euler || flame.forces.wind_model == WindForce::BodyForce;
+    // The force is the wind times the response.
+    (is_force && flame.forces.wind_response > 0.0)
+        .then(|| WindScale { strong: STRONG_FORCE / flame.forces.wind_response, unit: "N/m^3" })
 }
 
 #[cfg(test)]

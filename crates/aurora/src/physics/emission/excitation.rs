@@ -110,8 +110,8 @@ pub fn thermal_speed(temperature: f64, mass_u: f64) -> f64 {
 
 /// Probability that a contact with a sphere of `radius` in m de-excites a state within its mean lifetime (2.25).
 ///
-/// With the radius of the electrons' collisions, 3.2e-11 m, a tenth of the green light is left at 110 km and nearly all above 150 km. With that of a
-/// molecule, 1.85e-10 m, none is left below 190 km, which is not observed: few contacts with a molecule quench O(1S).
+/// With the radius of the electrons' collisions, 3.2e-11 m, 2.5 % of the green light are left at 110 km and 87 % at 150 km. With that of a
+/// molecule, 1.85e-10 m, 12 % are left at 170 km and 33 % at 190 km, which is not observed: few contacts with a molecule quench O(1S).
 #[must_use]
 pub fn hard_sphere_quenching(emitter: SpectralEmitter, air: &AirLevel, radius: f64) -> f64 {
     let mass_u = match emitter {
@@ -136,6 +136,51 @@ pub fn mean_hard_sphere_photons(air: &AirLevel, radius: f64) -> PerEmitter<f64> 
         let radiated = 1.0 - hard_sphere_quenching(emitter, air, radius);
         struck / air.number_density() * DIRECT_PHOTONS[emitter.index()] * radiated
     })
+}
+
+/// What a collision in some air emits by the rules of the thesis (2.4.2), drawn instead of averaged: its mean is [`mean_hard_sphere_photons`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DrawnEmission {
+    /// Fractions of the number density up to O, and up to N2 above it; O2 is the rest.
+    species: [f32; 2],
+    /// Probability of quenching, by emitter.
+    quenching: PerEmitter<f32>,
+}
+
+/// The two emitters of O, and those of N2.
+const EMITTERS_OF_SPECIES: [[SpectralEmitter; 2]; 2] = [
+    [SpectralEmitter::OxygenGreen, SpectralEmitter::OxygenRed],
+    [SpectralEmitter::NitrogenIon, SpectralEmitter::Nitrogen],
+];
+
+impl DrawnEmission {
+    /// Of collisions in this air, with spheres of `radius` in m that quench.
+    #[must_use]
+    pub(crate) fn new(air: &AirLevel, radius: f64) -> Self {
+        let density = air.number_density();
+        Self {
+            species: [(air.o / density) as f32, ((air.o + air.n2) / density) as f32],
+            quenching: EMITTERS.map(|emitter| hard_sphere_quenching(emitter, air, radius) as f32),
+        }
+    }
+
+    /// What shines after a collision, for three uniform numbers: the species by number density, one of its lines by production rate, and whether it is
+    /// quenched.
+    #[must_use]
+    pub(crate) fn draw(&self, [species, line, quenching]: [f32; 3]) -> Option<SpectralEmitter> {
+        let index = self.species.iter().position(|fraction| species < *fraction)?;
+        let [first, second] = EMITTERS_OF_SPECIES[index];
+        let share = (DIRECT_PHOTONS[first.index()] / Self::photons(first)) as f32;
+        let emitter = if line < share { first } else { second };
+        (quenching >= self.quenching[emitter.index()]).then_some(emitter)
+    }
+
+    /// Photons that a drawn emission stands for: all that a collision with its species makes, per ion pair.
+    #[must_use]
+    pub(crate) fn photons(emitter: SpectralEmitter) -> f64 {
+        let siblings = EMITTERS_OF_SPECIES.iter().find(|emitters| emitters.contains(&emitter));
+        siblings.into_iter().flatten().map(|emitter| DIRECT_PHOTONS[emitter.index()]).sum()
+    }
 }
 
 #[cfg(test)]
@@ -228,9 +273,15 @@ mod tests {
         let left = |altitude_km, radius| {
             1.0 - hard_sphere_quenching(SpectralEmitter::OxygenGreen, &atmosphere().at(altitude_km), radius)
         };
-        for (altitude_km, of_collisions, of_molecules) in
-            [(115.0, 0.16, 0.0), (120.0, 0.35, 0.0), (130.0, 0.64, 0.0), (150.0, 0.87, 0.01)]
-        {
+        for (altitude_km, of_collisions, of_molecules) in [
+            (110.0, 0.025, 0.0),
+            (115.0, 0.16, 0.0),
+            (120.0, 0.35, 0.0),
+            (130.0, 0.64, 0.0),
+            (150.0, 0.87, 0.01),
+            (170.0, 0.94, 0.12),
+            (190.0, 0.967, 0.33),
+        ] {
             let found = [3.2e-11, 1.85e-10].map(|radius| left(altitude_km, radius));
             assert!((found[0] - of_collisions).abs() < 0.006, "{altitude_km}: {found:?}");
             assert!((found[1] - of_molecules).abs() < 0.006, "{altitude_km}: {found:?}");
@@ -238,31 +289,15 @@ mod tests {
         assert!(hard_sphere_quenching(SpectralEmitter::NitrogenIon, &atmosphere().at(110.0), 1.85e-10) < 1e-3);
     }
 
-    /// What shines after a collision, drawn by the rules of the thesis.
-    fn drawn(air: &AirLevel, radius: f64, uniforms: [f64; 3]) -> Option<SpectralEmitter> {
-        use SpectralEmitter::{Nitrogen, NitrogenIon, OxygenGreen, OxygenRed};
-        let species_draw = uniforms[0] * air.number_density();
-        let struck = match species_draw {
-            species_draw if species_draw < air.o => [OxygenGreen, OxygenRed],
-            species_draw if species_draw < air.o + air.n2 => [NitrogenIon, Nitrogen],
-            _ => return None,
-        };
-        let rates = struck.map(|emitter| DIRECT_PHOTONS[emitter.index()]);
-        let emitter = struck[usize::from(uniforms[1] * (rates[0] + rates[1]) >= rates[0])];
-        (uniforms[2] >= hard_sphere_quenching(emitter, air, radius)).then_some(emitter)
-    }
-
     #[test]
     fn the_mean_of_the_rules_is_what_they_draw() {
         let air = atmosphere().at(220.0);
-        let [green, red, violet, deep_red] = DIRECT_PHOTONS;
-        // All photons that a species has.
-        let photons = [green + red, green + red, violet + deep_red, violet + deep_red];
+        let rules = DrawnEmission::new(&air, 1.85e-10);
         let (mut sum, draws) = ([0.0; 4], 100_000_u64);
         for draw in 0..draws {
-            let [a, b, c, _] = Key::new(1, "rules").uniforms(draw, 0, Purpose::named("draw")).map(f64::from);
-            if let Some(emitter) = drawn(&air, 1.85e-10, [a, b, c]) {
-                sum[emitter.index()] += photons[emitter.index()] / draws as f64;
+            let [a, b, c, _] = Key::new(1, "rules").uniforms(draw, 0, Purpose::named("draw"));
+            if let Some(emitter) = rules.draw([a, b, c]) {
+                sum[emitter.index()] += DrawnEmission::photons(emitter) / draws as f64;
             }
         }
         let mean = mean_hard_sphere_photons(&air, 1.85e-10);

@@ -277,7 +277,7 @@ mod tests {
             let light = |level: &usize| profile[*level][emitter.index()];
             level_altitude_km((0..LEVELS).max_by(|a, b| light(a).total_cmp(&light(b))).unwrap_or(0))
         };
-        // (2.25) with the one radius of the thesis moves green light up by some km; with that of a molecule it leaves none below 190 km. Electrons of
+        // (2.25) with the one radius of the thesis moves green light up by some km; with that of a molecule it leaves a third at 190 km. Electrons of
         // 1 keV come far too low, as violet light shows.
         let molecules = of_radius(Auto::Set(185.0));
         let green = [&measured, &spheres, &molecules].map(|table| peak_km(table, 5000.0, SpectralEmitter::OxygenGreen));

@@ -32,7 +32,7 @@ bansho_base::parameters! {
         /// Radius r of (2.22). At 32 pm electrons of 10 keV stop near 105 km, at 100 pm near 130 km.
         collision_radius_pm: f64 = DEFAULT_RADIUS_M / PICOMETER, limits(RADII_PM), unit("pm");
         /// Radius r of (2.25), by which excited atoms are quenched; `"auto"` is the radius of the collisions, as in the thesis. With collisions at 32 pm
-        /// and the radius of a molecule here, 185 pm, no green light is left below 190 km.
+        /// and the radius of a molecule here, 185 pm, 12 % of the green light are left at 170 km and 33 % at 190 km.
         quenching_radius_pm: Auto<f64> = Auto::Auto, limits(RADII_PM), unit("pm");
     }
 }
@@ -139,6 +139,12 @@ impl Deposition {
     pub(crate) fn from_hard_spheres(air: &Atmosphere, spectrum: Spectrum, radius: f64) -> Self {
         Self::from_profiles(HardSphereAtmosphere::new(air, radius, 0.0).profiles(air), spectrum)
     }
+}
+
+/// Ion pairs of one collision of electrons of an energy, m^-2 s^-1 per mW m^-2: each collision deposits 100 eV.
+#[must_use]
+pub(crate) fn ion_pairs_of_collision(energy_ev: f64) -> f64 {
+    EV_PER_S_PER_MW / energy_ev * (COLLISION_EV / ION_PAIR_EV)
 }
 
 /// Probabilities that a Poisson variable of that mean is below each of the ascending counts.

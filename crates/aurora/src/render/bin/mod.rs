@@ -204,7 +204,7 @@ impl Sources {
     }
 
     fn with_afterglow(inputs: &EmissionInputs, afterglow: &Afterglow, field: &FieldLines, times: &SampleTimes) -> Self {
-        let by_collisions = inputs.parameters.sampling == Sampling::SingleCollisions;
+        let by_collisions = inputs.parameters.sampling != Sampling::MeanProfile;
         let min_power = if by_collisions { MIN_RELATIVE_POWER_WITH_COLLISIONS } else { MIN_RELATIVE_POWER };
         let column = inputs.emission.column(inputs.energy_ev);
         let spread = math::hypot(inputs.spread_km(), times.smear_km);

@@ -19,10 +19,12 @@ use fearless_simd::{Simd, dispatch, prelude::*};
 
 use super::{
     collision_block::{COLLISION_BLOCK_COLUMNS, CollisionBlock},
+    drawn_electrons::{DrawnElectrons, DrawnTrack},
     rasterize::{RowRange, SPLAT_LANES, SplatBatch, TrackRasterizer},
     track_table::{CollisionBatch, TrackTable},
 };
 use crate::{
+    parameters::Sampling,
     physics::{
         atmosphere::atmosphere,
         emission::{Emission, PerEmitter},
@@ -62,6 +64,9 @@ const EXACT_REACHES: f32 = 16.0;
 #[derive(Clone, Debug)]
 pub(crate) struct CollisionRenderer {
     key: Key,
+    /// For `sampling = "single_photons"`: tracks that are drawn for each source instead of taken from the library.
+    drawn: Option<DrawnElectrons>,
+    /// Empty if tracks are drawn.
     tracks: TrackTable,
     deposition: Deposition,
     /// Counted photons per ion pair, by level.
@@ -99,7 +104,13 @@ impl CollisionRenderer {
         photons.push([0.0; 4]);
         let (deposition, deflection) = (emission.deposition(), rendering.collision_deflection);
         let mut pairs: Vec<_> = (0..NODES).map(|node| emission.ion_pairs_per_collision(node) as f32).collect();
+        let drawn = (rendering.sampling == Sampling::SinglePhotons).then(|| DrawnElectrons::new(rendering, key));
+        if drawn.is_some() {
+            photons.extend(DrawnElectrons::photon_rows(attenuation));
+            pairs = DrawnElectrons::pairs();
+        }
         let tracks = match rendering.energy_deposition {
+            _ if drawn.is_some() => TrackTable::default(),
             TrackModel::Fang2010 => fang_tracks(&TrackSampler::new(deposition, deflection), highest, key),
             TrackModel::HardSphereAtmosphere => {
                 let radius = rendering.hard_spheres.collision_radius();
@@ -118,6 +129,7 @@ impl CollisionRenderer {
         }
         Self {
             key,
+            drawn,
             tracks,
             deposition: emission.deposition().clone(),
             photons,
@@ -165,16 +177,25 @@ impl CollisionRenderer {
         buffer
     }
 
-    /// The track of a source.
+    /// The track of a source; `drawn` holds it if tracks are drawn.
     #[inline(always)]
-    fn track(&self, source: FieldLineSource, step: u32) -> SourceTrack<'_> {
+    fn track<'a>(&'a self, source: FieldLineSource, step: u32, drawn: &'a mut DrawnTrack) -> SourceTrack<'a> {
         let [a, b, c, d] = self.key.words(u64::from(source.random_key), step, SOURCE);
         let below = (source.energy_node as usize).min(NODES - 2);
         // One of the two nodes at random, so that the mean over sources is linear between them and the tables need no interpolation.
         let central_node = below + usize::from(uniform(a) < source.energy_node - below as f32);
-        // Energies above the tables use the highest node: its collision count and weight belong together.
-        let node = self.deposition.sample_node_around(central_node, uniform_f64(b, d)).min(self.tracks.highest_node());
-        let batches = self.tracks.track(node, c);
+        let node = self.deposition.sample_node_around(central_node, uniform_f64(b, d));
+        let (node, batches) = match &self.drawn {
+            Some(electrons) => {
+                electrons.draw(node, u64::from(source.random_key) << 32 | u64::from(step), drawn);
+                (node, &*drawn.batches)
+            }
+            None => {
+                // Energies above the tables use the highest node: its collision count and weight belong together.
+                let node = node.min(self.tracks.highest_node());
+                (node, self.tracks.track(node, c))
+            }
+        };
         SourceTrack {
             source,
             batches,
@@ -225,6 +246,7 @@ struct CollisionScratch {
     block: CollisionBlock,
     rasterizer: TrackRasterizer,
     points: [SplatBatch; PIPELINED_BATCHES],
+    drawn: Vec<DrawnTrack>,
 }
 
 impl CollisionScratch {
@@ -233,6 +255,7 @@ impl CollisionScratch {
             block: CollisionBlock::new(chart),
             rasterizer: TrackRasterizer::new(chart.rows),
             points: [SplatBatch::NONE; PIPELINED_BATCHES],
+            drawn: std::iter::repeat_with(DrawnTrack::default).take(LOOKAHEAD_SOURCES).collect(),
         }
     }
 }
@@ -274,22 +297,24 @@ impl CollisionPass<'_> {
     #[inline(always)]
     fn draw_block<S: Simd>(&self, simd: S, block: ColumnBlock, field: &FieldLines, scratch: &mut CollisionScratch) {
         let entries = scratch.block.begin(block.number, self.chart, self.sorted_sources, field);
-        let (mut sources, mut tracks) = (Vec::with_capacity(LOOKAHEAD_SOURCES), Vec::with_capacity(LOOKAHEAD_SOURCES));
+        let mut sources = Vec::with_capacity(LOOKAHEAD_SOURCES);
+        let mut drawn = std::mem::take(&mut scratch.drawn);
         for entries in entries.chunks(LOOKAHEAD_SOURCES) {
             sources.clear();
             for entry in entries {
                 sources.push(*self.sorted_sources.source(entry.source));
             }
-            tracks.clear();
+            let mut tracks = Vec::with_capacity(LOOKAHEAD_SOURCES);
             // Loops of their own: the loads of one are independent of each other, so that their cache misses overlap. A single loop would wait for a
             // source, then for its track, before it projects.
-            for source in &sources {
-                tracks.push(self.collisions.track(*source, self.step));
+            for (source, drawn) in sources.iter().zip(&mut drawn) {
+                tracks.push(self.collisions.track(*source, self.step, drawn));
             }
             for (entry, track) in entries.iter().zip(&tracks) {
                 self.splat_source(simd, entry.columns(), track, scratch);
             }
         }
+        scratch.drawn = drawn;
         scratch.block.write(block, self.chart.rows);
         scratch.block.recycle(entries);
     }
@@ -336,7 +361,7 @@ impl CollisionPass<'_> {
         column: usize,
         scratch: &mut CollisionScratch,
     ) {
-        let CollisionScratch { block, rasterizer, points } = scratch;
+        let CollisionScratch { block, rasterizer, points, .. } = scratch;
         rasterizer.reset();
         let (meridian, distance) = block.meridian_and_distance(column, &track.source);
         // A line is hidden as a whole, by its lower border: between the first and the last of its light are less than 100 km beyond the limb.

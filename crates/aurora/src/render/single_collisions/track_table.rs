@@ -11,13 +11,13 @@ use crate::{
     render::project::altitude_polynomial::RowPolynomialBasis,
 };
 
-/// Photon row for padding lanes: no emission. Other values are levels of the atmosphere.
-const NO_EMISSION: u16 = LEVELS as u16;
+/// Photon row for padding lanes and collisions without light. The values below are levels of the atmosphere.
+pub(super) const NO_EMISSION: u16 = LEVELS as u16;
 /// Lane stride between successive collisions of a full batch; odd, so that all lanes are filled.
 const LANE_STRIDE: usize = 5;
 
 /// Tracks of a library in batches.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct TrackTable {
     /// Start of each node's tracks, and the total, in batches.
     starts: Vec<usize>,
@@ -92,13 +92,7 @@ fn batches(track: &[(Collision, u16)], count: usize) -> Vec<CollisionBatch> {
         batches[others % full].set_lane(others / full * LANE_STRIDE % SPLAT_LANES, &(*collision, NO_EMISSION));
         others += 1;
     }
-    // Unused lanes are placed at the first lane, so that no extra row is touched.
-    for batch in &mut batches[full..] {
-        for lane in batch.count as usize..SPLAT_LANES {
-            (batch.altitude_coordinates[lane], batch.offsets_km[lane]) =
-                (batch.altitude_coordinates[0], batch.offsets_km[0]);
-        }
-    }
+    batches[full..].iter_mut().for_each(CollisionBatch::fill_unused_lanes);
     batches
 }
 
@@ -116,6 +110,25 @@ impl CollisionBatch {
         self.photon_rows[lane] = *light;
         self.count += 1;
     }
+
+    /// Places unused lanes at the first lane, so that no extra row is touched.
+    fn fill_unused_lanes(&mut self) {
+        for lane in self.count as usize..SPLAT_LANES {
+            (self.altitude_coordinates[lane], self.offsets_km[lane]) =
+                (self.altitude_coordinates[0], self.offsets_km[0]);
+        }
+    }
+}
+
+/// Replaces `batches` by those of a single track, in any number of collisions.
+pub(super) fn fill_batches(track: &[(Collision, u16)], batches: &mut Vec<CollisionBatch>) {
+    batches.clear();
+    batches.extend(track.chunks(SPLAT_LANES).map(|collisions| {
+        let mut batch = CollisionBatch::EMPTY;
+        collisions.iter().enumerate().for_each(|(lane, collision)| batch.set_lane(lane, collision));
+        batch.fill_unused_lanes();
+        batch
+    }));
 }
 
 #[cfg(test)]

@@ -24,6 +24,17 @@ fn beside_profile(
     cells: &[AfterglowCell<1>],
     spread_km: f64,
 ) -> ([f64; 3], ColumnBuffer) {
+    let (mean, expected) = mean_picture(emission, collisions, cells, spread_km);
+    (differences(&mean, &expected.light), expected)
+}
+
+/// The mean of 64 pictures of collisions, and the picture of the mean profile.
+fn mean_picture(
+    emission: &Emission,
+    collisions: &CollisionRenderer,
+    cells: &[AfterglowCell<1>],
+    spread_km: f64,
+) -> (Vec<PerEmitter<f32>>, ColumnBuffer) {
     let (profiles, view, field) = (
         EmissionProfiles::new(emission, &AttenuationByDistance::default()),
         view(Lens::Perspective, [0.0, 60.0, -110.0], [160, 90]),
@@ -42,7 +53,7 @@ fn beside_profile(
             *sum = std::array::from_fn(|i| light[i].mul_add(1.0 / 64.0, sum[i]));
         }
     }
-    (differences(&mean, &expected.light), expected)
+    (mean, expected)
 }
 
 /// The same for an arc of so many particles with tracks of a seed.
@@ -59,6 +70,12 @@ fn arc_beside_profile(
 
 /// The same for any rendering.
 fn arc_drawn(drawing: &RenderingParameters, seed: u64, particles: usize) -> ([f64; 3], ColumnBuffer) {
+    let (mean, expected) = arc_pictures(drawing, seed, particles);
+    (differences(&mean, &expected.light), expected)
+}
+
+/// The mean of pictures of collisions of an arc, and the picture of the mean profile.
+fn arc_pictures(drawing: &RenderingParameters, seed: u64, particles: usize) -> (Vec<PerEmitter<f32>>, ColumnBuffer) {
     let emission = drawing.emission(SpectrumShape::Gaussian);
     let collisions = CollisionRenderer::new(
         &emission,
@@ -68,7 +85,7 @@ fn arc_drawn(drawing: &RenderingParameters, seed: u64, particles: usize) -> ([f6
         Key::new(seed, "aurora"),
     );
     let spread_km = math::hypot(OWN_SPREAD_KM, emission.lateral_spread_km(drawing.collision_deflection, ENERGY_EV));
-    beside_profile(&emission, &collisions, &arc(particles), spread_km)
+    mean_picture(&emission, &collisions, &arc(particles), spread_km)
 }
 
 fn usual_collision_deflection() -> f64 {
@@ -91,12 +108,30 @@ fn the_mean_of_many_collision_pictures_is_the_profile() {
 
 #[test]
 fn the_mean_of_many_tracks_of_the_thesis_is_their_profile() {
-    // A track has a single collision or two above 190 km, where all green light is: more noise, and so more particles.
+    // A track has a single collision or two above 190 km, where much of the red light is: more noise, and so more particles.
     for (seed, collision_deflection) in
         [(5, usual_collision_deflection()), (77, usual_collision_deflection()), (5, MAX_COLLISION_DEFLECTION)]
     {
         let (apart, _) = arc_beside_profile(TrackModel::HardSphereAtmosphere, collision_deflection, seed, 40_000);
         assert!(apart.iter().all(|apart| *apart < 0.03), "seed {seed}, deflection {collision_deflection}: {apart:?}");
+    }
+}
+
+#[test]
+fn single_photons_have_the_mean_of_single_collisions() {
+    let spheres =
+        RenderingParameters { energy_deposition: TrackModel::HardSphereAtmosphere, ..RenderingParameters::default() };
+    let [(photons, expected), (collisions, _)] = [Sampling::SinglePhotons, Sampling::SingleCollisions]
+        .map(|sampling| arc_pictures(&RenderingParameters { sampling, ..spheres.clone() }, 5, 12_000));
+    let apart = differences(&photons, &expected.light);
+    let total = |picture: &[PerEmitter<f32>], emitter: SpectralEmitter| {
+        picture.iter().map(|light| f64::from(light[emitter.index()])).sum::<f64>()
+    };
+    let emitters = [SpectralEmitter::OxygenGreen, SpectralEmitter::NitrogenIon, SpectralEmitter::Nitrogen];
+    for (emitter, apart) in emitters.into_iter().zip(apart) {
+        let ratio = total(&photons, emitter) / total(&collisions, emitter);
+        // The means by row are noisier than those of the whole picture.
+        assert!((ratio - 1.0).abs() < 0.01 && apart < 0.1, "{emitter:?}: {ratio}, {apart}");
     }
 }
 
@@ -149,7 +184,7 @@ fn green_light_is_higher_with_the_tracks_of_the_thesis() {
     let measured = drawn(TrackModel::Fang2010, Auto::Auto);
     let [one_radius, molecules] =
         [Auto::Auto, Auto::Set(185.0)].map(|radius| drawn(TrackModel::HardSphereAtmosphere, radius));
-    // Rows of 5 mrad: quenched by molecules, green light is only above 190 km; with one radius its middle is higher, but less so. Violet light is hardly
+    // Rows of 5 mrad: quenched by molecules, most green light is above 190 km; with one radius its middle is higher, but less so. Violet light is hardly
     // elsewhere at this energy.
     let [green, violet] = [SpectralEmitter::OxygenGreen, SpectralEmitter::NitrogenIon]
         .map(|emitter| [&measured, &one_radius, &molecules].map(|picture| middle_row(picture, emitter)));

@@ -99,6 +99,7 @@ pub(crate) fn describe(
         "exposure_s": cube.exposure,
         "velocity": streaks.law.name(),
         "opacity_law": cube.opacity.name(),
+        "drop_count": cube.drop_count.name(),
         "air": { "density_kg_per_m3": cube.terminal_velocity.air.density, "viscosity_pa_s": cube.terminal_velocity.air.viscosity },
         "diameters": if cube.spread { "sampled within the bin for each drop" } else { "that of the bin" },
         "seed": streaks.seed,

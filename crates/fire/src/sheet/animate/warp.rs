@@ -10,7 +10,7 @@ use bansho_base::{
 };
 use fearless_simd::Simd;
 
-use super::{clock::Clock, fluctuation::Fluctuation};
+use super::{clock::Clock, edge_waves::EdgeWaves, fluctuation::Fluctuation};
 use crate::sheet::{
     parameters::{FlameSheetParameters, SheetShapeParameters},
     tables::{
@@ -22,8 +22,8 @@ use crate::sheet::{
 /// The fluctuations of one flame: its edges P (15), the sway of its center line and the flicker of its height.
 #[derive(Clone, Debug)]
 pub(crate) struct FlameWaves {
-    left: Fluctuation,
-    right: Fluctuation,
+    left: EdgeWaves,
+    right: EdgeWaves,
     sway: Fluctuation,
     flicker: Fluctuation,
 }
@@ -32,8 +32,8 @@ impl FlameWaves {
     /// The fluctuations of a flame of this shape with the random numbers of `key`.
     pub(crate) fn new(shape: &SheetShapeParameters, key: Key, clock: &Clock) -> Self {
         // Edges scroll with the texture, so that in a loop a whole number of their waves passes; sway and flicker are functions of time.
-        let [left, right] = [Purpose::named("left edge"), Purpose::named("right edge")]
-            .map(|purpose| Fluctuation::new(key, purpose, shape.flutter_waves, 0.9, |waves| clock.waves(waves, 1.0)));
+        let [left, right] = [(Purpose::named("left edge"), 0.5), (Purpose::named("right edge"), 0.0)]
+            .map(|(purpose, phase)| EdgeWaves::new(shape, key, purpose, phase, clock));
         let [sway, flicker] =
             [(Purpose::named("sway"), shape.sway_hz, 0.5), (Purpose::named("flicker"), shape.flicker_hz, 0.6)]
                 .map(|(purpose, hz, roughness)| Fluctuation::new(key, purpose, hz, roughness, |f| clock.frequency(f)));
@@ -143,7 +143,7 @@ fn evaluate_warp(
 
 /// P(w - s (t-t0)) of eq. (15), in [0, 1], over w after `scroll` sheet heights: the weaker the flutter, the closer it stays to 1, the outer edge of the fringe.
 #[inline(always)]
-fn edge_fluctuation(waves: &Fluctuation, scroll: f64, flutter: f32) -> [f32; SEGMENTS + 1] {
+fn edge_fluctuation(waves: &EdgeWaves, scroll: f64, flutter: f32) -> [f32; SEGMENTS + 1] {
     let mut values = [0.0; SEGMENTS + 1];
     waves.fill(-scroll, 1.0 / SEGMENTS as f64, &mut values);
     for value in &mut values {

@@ -2,6 +2,8 @@
 
 mod fractal;
 mod paper;
+mod periodic;
+mod picture;
 
 use std::{
     collections::BTreeMap,
@@ -15,8 +17,10 @@ use bansho_base::math::{
 use fearless_simd::{Simd, dispatch};
 use fractal::FRACTAL;
 pub(crate) use fractal::{FractalLayers, LayerMapping, fractal_noise};
-pub(crate) use paper::{PaperLayer, PaperSum};
+pub(crate) use paper::{PaperSum, paper_layer};
 pub use paper::{PaperTexture, paper_texture};
+pub(crate) use periodic::PeriodicLayer;
+pub(crate) use picture::picture_texels;
 
 /// Columns of a table, along u.
 pub(crate) const COLUMNS: usize = 256;
@@ -222,8 +226,8 @@ impl FlameTexture {
 pub(crate) enum TextureSource {
     /// The layers of this flame on the common noise table.
     Fractal(FractalLayers),
-    /// The paper's table, common to all instances.
-    Paper(Arc<PaperLayer>),
+    /// A table that repeats, common to all instances: the paper's, or a picture.
+    Periodic(Arc<PeriodicLayer>),
     /// The paper's sum.
     Exact(PaperSum),
 }
@@ -233,7 +237,7 @@ impl TextureSource {
     pub(crate) fn texels_up(&self) -> f64 {
         match self {
             Self::Fractal(layers) => layers.texels_up(),
-            Self::Paper(layer) => layer.texels_up(),
+            Self::Periodic(layer) => layer.texels_up(),
             Self::Exact(_) => 0.0,
         }
     }
@@ -244,7 +248,7 @@ impl TextureSource {
     pub(crate) fn texture(&self, scroll: f64) -> FlameTexture {
         match self {
             Self::Fractal(layers) => layers.at(&FRACTAL, scroll),
-            Self::Paper(layer) => layer.at(scroll),
+            Self::Periodic(layer) => layer.at(scroll),
             Self::Exact(sum) => FlameTexture::Exact(*sum, scroll),
         }
     }
@@ -262,8 +266,8 @@ impl TextureSource {
         match self {
             Self::Fractal(layers) if level > 0.0 => FilteredTexture::Fractal(*layers, cache.filtered_fractal(level)),
             Self::Fractal(layers) => FilteredTexture::Fractal(*layers, FRACTAL.clone()),
-            Self::Paper(layer) if level > 0.0 => FilteredTexture::Paper(Arc::new(layer.filtered(level))),
-            Self::Paper(layer) => FilteredTexture::Paper(layer.clone()),
+            Self::Periodic(layer) if level > 0.0 => FilteredTexture::Periodic(Arc::new(layer.filtered(level))),
+            Self::Periodic(layer) => FilteredTexture::Periodic(layer.clone()),
             Self::Exact(sum) => FilteredTexture::Exact(*sum),
         }
     }
@@ -339,8 +343,8 @@ impl Clone for FilterCache {
 pub(crate) enum FilteredTexture {
     /// Layers and their filtered table.
     Fractal(FractalLayers, Arc<TextureTable>),
-    /// The paper's texture.
-    Paper(Arc<PaperLayer>),
+    /// A table that repeats.
+    Periodic(Arc<PeriodicLayer>),
     /// The paper's sum, which is not filtered.
     Exact(PaperSum),
 }
@@ -355,7 +359,7 @@ impl FilteredTexture {
     pub(crate) fn texture(&self, scroll: f64) -> FlameTexture {
         match self {
             Self::Fractal(layers, table) => layers.at(table, scroll),
-            Self::Paper(layer) => layer.at(scroll),
+            Self::Periodic(layer) => layer.at(scroll),
             Self::Exact(sum) => FlameTexture::Exact(*sum, scroll),
         }
     }

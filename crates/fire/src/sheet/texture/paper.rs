@@ -1,9 +1,6 @@
 //! The paper's texture, eq. (20), exactly and as a table.
 
-use std::{
-    f64::consts::{FRAC_PI_2, PI},
-    sync::Arc,
-};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use bansho_base::math::{
     self, MulAdd,
@@ -11,7 +8,10 @@ use bansho_base::math::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-use super::{COLUMNS, FlameTexture, ROWS, TextureLayer, TextureTable};
+use super::{
+    COLUMNS, ROWS,
+    periodic::{PeriodicLayer, relative_speed},
+};
 use crate::sheet::animate::clock::Clock;
 
 /// `Fx_0` of eq. (20), radians per unit of p.
@@ -123,64 +123,29 @@ impl PaperTexture {
     }
 }
 
-/// One period of the paper's texture as a table.
-#[derive(Clone, Debug)]
-pub(crate) struct PaperLayer {
-    table: Arc<TextureTable>,
-    /// Scroll speed relative to the parameter: 1, unless a loop requires an integer number of periods.
-    relative_speed: f64,
-}
-
-impl PaperLayer {
-    /// The table of `octaves` terms.
-    pub(crate) fn new(octaves: u32, clock: &Clock) -> Self {
-        let p: Vec<f64> = (0..COLUMNS).map(|i| PERIOD_P * i as f64 / COLUMNS as f64).collect();
-        let q: Vec<f64> = (0..ROWS).map(|i| PERIOD_Q * i as f64 / ROWS as f64).collect();
-        let texture = PaperTexture::new(&p, &q, octaves);
-        let mut texels = vec![0.0; ROWS * COLUMNS];
-        let level = bansho_base::math::simd::level();
-        fearless_simd::dispatch!(level, _simd => fill(&texture, &mut texels));
-        Self { table: Arc::new(TextureTable::new(&texels)), relative_speed: relative_speed(clock) }
-    }
-
-    /// The texture after `scroll` sheet heights, eq. (1).
-    pub(crate) fn at(&self, scroll: f64) -> FlameTexture {
-        let columns = (COLUMNS as f64 / PERIOD_P) as f32;
-        let rows = ROWS as f64 / PERIOD_Q;
-        let offset = math::reduce_phase(-self.relative_speed * scroll / PERIOD_Q) * ROWS as f32;
-        let layer = TextureLayer {
-            columns_per_u: columns,
-            columns_per_w: 0.0,
-            first_column: 0.0,
-            rows_per_w: rows as f32,
-            first_row: offset,
-        };
-        FlameTexture::Single(self.table.clone(), layer)
-    }
-
-    /// This layer with its table filtered to `level`.
-    pub(crate) fn filtered(&self, level: f32) -> Self {
-        Self { table: Arc::new(self.table.filtered(level)), relative_speed: self.relative_speed }
-    }
-
-    /// Texels per sheet height.
-    pub(crate) fn texels_up(&self) -> f64 {
-        ROWS as f64 / PERIOD_Q
-    }
+/// One period of the texture of `octaves` terms as a table.
+pub(crate) fn paper_layer(octaves: u32, clock: &Clock) -> PeriodicLayer {
+    let p: Vec<f64> = (0..COLUMNS).map(|i| PERIOD_P * i as f64 / COLUMNS as f64).collect();
+    let q: Vec<f64> = (0..ROWS).map(|i| PERIOD_Q * i as f64 / ROWS as f64).collect();
+    let texture = PaperTexture::new(&p, &q, octaves);
+    let mut texels = vec![0.0; ROWS * COLUMNS];
+    let level = bansho_base::math::simd::level();
+    fearless_simd::dispatch!(level, _simd => fill(&texture, &mut texels));
+    PeriodicLayer::new(&texels, [PERIOD_P, PERIOD_Q], clock)
 }
 
 /// Eq. (20), evaluated point by point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PaperSum {
     octaves: u32,
-    /// As that of [`PaperLayer`].
+    /// As that of [`PeriodicLayer`].
     relative_speed: f64,
 }
 
 impl PaperSum {
     /// The sum of `octaves` terms.
     pub(crate) fn new(octaves: u32, clock: &Clock) -> Self {
-        Self { octaves, relative_speed: relative_speed(clock) }
+        Self { octaves, relative_speed: relative_speed(PERIOD_Q, clock) }
     }
 
     /// T0 at sixteen points, eq. (2). Not inlined, so that the code is compiled once.
@@ -193,11 +158,6 @@ impl PaperSum {
         }
         Lanes::from_slice(u.simd, &values)
     }
-}
-
-/// Scroll speed relative to the parameter: 1, unless a loop requires an integer number of periods.
-fn relative_speed(clock: &Clock) -> f64 {
-    clock.waves(1.0 / PERIOD_Q, 1.0) * PERIOD_Q
 }
 
 #[inline(always)]
@@ -253,7 +213,7 @@ mod tests {
 
     #[test]
     fn the_table_is_the_texture_within_its_resolution() {
-        let layer = PaperLayer::new(5, &Clock::new(Animated::from(1.0), None));
+        let layer = paper_layer(5, &Clock::new(Animated::from(1.0), None));
         let scroll = 1234.567;
         let (u, w): ([f32; 16], [f32; 16]) =
             (std::array::from_fn(|i| 0.06 * i as f32 + 0.03), std::array::from_fn(|i| 0.055 * i as f32));

@@ -179,6 +179,33 @@ fn a_recording_does_not_loop() {
 }
 
 #[test]
+fn dragging_the_wind_of_the_papers_gas_sets_a_force_per_volume() {
+    /// The gas of Inagaki et al., few particles of it.
+    const GAS: &str = "bansho = 2\n[picture]\nsize = [64, 36]\nframes = 30\n[[flame_particles]]\nparticles = 60\n\
+                       [[flame_particles.burners]]\nspeed = 2.0\n[flame_particles.forces]\nwind_model = \"body_force\"\n";
+    let dragged_x = |scene: &str| -> f64 {
+        let mut harness = window(scene);
+        let middle = blow(&mut harness);
+        let edited = text(&mut harness);
+        release(&mut harness, middle);
+        let start = edited.find("velocity = [").unwrap() + "velocity = [".len();
+        edited[start..].split(',').next().unwrap().parse().unwrap()
+    };
+    let velocity = dragged_x(&GAS.replace("body_force", "entrainment"));
+    assert!(velocity > 1.0, "{velocity} m/s");
+    // The same drag: 0.1 N/m^3 over the height instead of 8 m/s.
+    for (response, unit) in [(1.0, 1.0), (0.01, 100.0)] {
+        let force = dragged_x(&format!("{GAS}wind_response = {response}\n"));
+        assert!((force - velocity * 0.1 / 8.0 * unit).abs() < 1e-3 * unit, "{force} for {velocity} m/s");
+    }
+    let mut harness = window(GAS);
+    let hint = super::super::viewport::wind_drag::wind_hint(super::super::viewport::wind_drag::wind_scale(
+        harness.state_mut().session(),
+    ));
+    assert!(hint.ends_with("it is 0.1 N/m^3"), "{hint}");
+}
+
+#[test]
 fn saving_during_a_wind_drag_saves_no_temporary_wind() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");

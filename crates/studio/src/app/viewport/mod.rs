@@ -3,7 +3,7 @@
 mod curve_overlay;
 mod handles;
 mod pointer;
-mod wind_drag;
+pub(in crate::app) mod wind_drag;
 
 use bansho::{
     base::{camera::Camera, math::DVec2, parameters::Value},
@@ -12,12 +12,13 @@ use bansho::{
 
 use crate::{
     app::widgets::picture_texture::PictureTexture,
+    document::editor_hints::WindScale,
     session::{Session, selection::Selection},
 };
 use eframe::egui::{self, Color32, PointerButton, Pos2, Rect, Response, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use handles::{Handle, handles};
 use pointer::{CameraPose, rounded};
-use wind_drag::WindDrag;
+use wind_drag::{WindDrag, wind_hint, wind_scale};
 
 /// The margin around the picture: dark, but not black, so that the border of the picture is visible.
 const SURROUND: Color32 = Color32::from_gray(18);
@@ -89,7 +90,7 @@ impl Viewport {
             ui.selectable_value(&mut self.tool, ViewportTool::Camera, "Camera")
                 .on_hover_text("Drag to orbit, with Shift or the middle button to pan, scroll to dolly");
             ui.selectable_value(&mut self.tool, ViewportTool::Wind, "Blow")
-                .on_hover_text("Drag to set the wind to the direction and length of the drag");
+                .on_hover_text(wind_hint(wind_scale(session)));
             ui.selectable_value(&mut self.tool, ViewportTool::MoveHandles, "Place")
                 .on_hover_text("Drag lamps, flames and burners");
             ui.toggle_value(&mut session.recording, "Record")
@@ -152,7 +153,8 @@ impl Viewport {
         }
         match &self.wind_drag {
             Some(wind_drag) if response.dragged_by(PointerButton::Primary) => {
-                wind_drag.update(session, pointer::wind_of_drag(drag, camera));
+                let WindScale { strong, .. } = wind_scale(session);
+                wind_drag.update(session, pointer::wind_of_drag(drag, strong, camera));
             }
             _ => {}
         }

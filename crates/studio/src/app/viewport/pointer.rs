@@ -103,12 +103,9 @@ fn rotate(offset: DVec3, [azimuth, elevation]: [f64; 2]) -> DVec3 {
     distance * DVec3::new(sin_a * cos_b, sin_b, cos_a * cos_b)
 }
 
-/// The wind, m/s, of a drag by `drag` viewport heights: in the image plane, as in the paper.
-pub(super) fn wind_of_drag(drag: DVec2, camera: &Camera) -> DVec3 {
-    /// Wind of a drag over the height of the viewport, m/s.
-    const WIND_PER_HEIGHT_M_PER_S: f64 = 8.0;
-    let along = camera.world_from_camera.x_axis * drag.x - camera.world_from_camera.y_axis * drag.y;
-    along * WIND_PER_HEIGHT_M_PER_S
+/// The wind of a drag by `drag` viewport heights, `strong` over the height of the viewport: in the image plane, as in section 6 of Inagaki et al.
+pub(super) fn wind_of_drag(drag: DVec2, strong: f64, camera: &Camera) -> DVec3 {
+    (camera.world_from_camera.x_axis * drag.x - camera.world_from_camera.y_axis * drag.y) * strong
 }
 
 /// The point at `pixel` that has the same depth as `point`.
@@ -203,8 +200,8 @@ mod tests {
 
     #[test]
     fn a_drag_to_the_right_blows_to_the_right() {
-        assert!(near(wind_of_drag(DVec2::new(0.5, 0.0), &camera()), DVec3::new(4.0, 0.0, 0.0)));
-        assert!(near(wind_of_drag(DVec2::new(0.0, -0.25), &camera()), DVec3::new(0.0, 2.0, 0.0)));
+        assert!(near(wind_of_drag(DVec2::new(0.5, 0.0), 8.0, &camera()), DVec3::new(4.0, 0.0, 0.0)));
+        assert!(near(wind_of_drag(DVec2::new(0.0, -0.25), 8.0, &camera()), DVec3::new(0.0, 2.0, 0.0)));
     }
 
     #[test]

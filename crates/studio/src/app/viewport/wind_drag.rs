@@ -5,8 +5,13 @@ use bansho::{
     scene::{ValuePath, operation::Operation},
 };
 
-use super::pointer::rounded;
-use crate::{document::keyframes, session::Session};
+use crate::{
+    document::{
+        editor_hints::{WindScale, editor_hints},
+        keyframes,
+    },
+    session::Session,
+};
 
 /// A wind drag, with the wind before it began.
 #[derive(Clone, Debug)]
@@ -15,6 +20,8 @@ pub(super) struct WindDrag {
     recording: bool,
     /// When it began, s.
     start_s: f64,
+    /// Decimal places of the wind, so that files stay readable.
+    decimal_places: i32,
 }
 
 /// The label of the undo step.
@@ -30,7 +37,12 @@ impl WindDrag {
         let base_velocity = keyframes::vector(session.document.values(), &velocity_path(), session.transport.time_s())
             .unwrap_or_default();
         let base_velocity = base_velocity.to_array();
-        let wind_drag = Self { base_velocity, recording: session.recording, start_s: session.transport.time_s() };
+        let wind_drag = Self {
+            base_velocity,
+            recording: session.recording,
+            start_s: session.transport.time_s(),
+            decimal_places: decimal_places(wind_scale(session)),
+        };
         session.document.end_step();
         if wind_drag.recording {
             session.transport.play_to_the_end();
@@ -39,9 +51,10 @@ impl WindDrag {
         wind_drag
     }
 
-    /// Sets the wind to `wind`, m/s, on top of the wind before the drag.
+    /// Sets the wind to `wind`, in the unit of the scene's wind, on top of the wind before the drag.
     pub(super) fn update(&self, session: &mut Session, wind: DVec3) {
-        let velocity = rounded(DVec3::from(self.base_velocity) + wind);
+        let steps = f64::powi(10.0, self.decimal_places);
+        let velocity = (DVec3::from(self.base_velocity) + wind).to_array().map(|speed| (speed * steps).round() / steps);
         if self.recording {
             // The keyframe at the start of the drag stays, and recording stops at the end of the shot.
             if session.transport.time_s() != self.start_s && session.transport.is_playing() {
@@ -69,4 +82,24 @@ impl WindDrag {
         let operation = session.keyframe_operation(&velocity_path(), Value::numbers(velocity));
         session.edit(LABEL, &[operation]);
     }
+}
+
+/// The scale of the scene's wind: that of the first phenomenon for which it is not a velocity.
+pub(in crate::app) fn wind_scale(session: &Session) -> WindScale {
+    let scene = session.plan().map(|plan| plan.scene());
+    let mut instances = scene.into_iter().flat_map(|scene| &scene.instances);
+    let scale = instances.find_map(|instance| editor_hints(instance.kind.key).wind?(&*instance.parameters));
+    scale.unwrap_or(WindScale::VELOCITY)
+}
+
+/// What the tool does, and how strongly.
+pub(in crate::app) fn wind_hint(WindScale { strong, unit }: WindScale) -> String {
+    format!(
+        "Drag to set the wind to the direction and length of the drag; over the height of the viewport it is {strong} {unit}"
+    )
+}
+
+/// Thousandths of 1 m/s, and at least thousandths of a strong wind.
+fn decimal_places(WindScale { strong, .. }: WindScale) -> i32 {
+    3 + (-strong.log10()).ceil().clamp(0.0, 9.0) as i32
 }
