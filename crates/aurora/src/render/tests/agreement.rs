@@ -108,7 +108,7 @@ fn the_mean_of_many_collision_pictures_is_the_profile() {
 
 #[test]
 fn the_mean_of_many_tracks_of_the_thesis_is_their_profile() {
-    // A track has a single collision or two above 190 km, where much of the red light is: more noise, and so more particles.
+    // Green light is quenched low down, where a track has most of its collisions; it comes from the few that are left above: more noise, and so more particles.
     for (seed, collision_deflection) in
         [(5, usual_collision_deflection()), (77, usual_collision_deflection()), (5, MAX_COLLISION_DEFLECTION)]
     {
