@@ -61,6 +61,7 @@
 //! 9. applies the extinction and converts to color (`shade`); pixels of any lens sample the chart (`prepared`).
 
 pub(crate) mod model;
+mod paper_settings;
 mod parameters;
 mod phenomenon;
 pub mod physics;

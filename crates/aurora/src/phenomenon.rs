@@ -24,6 +24,7 @@ impl AuroraParameters {
     pub const KIND: TableKind = TableKind {
         built_bytes: 75e3,
         placement_keys: &["shapes", "extent_km"],
+        paper: Some(&crate::paper_settings::PAPER),
         first_keys: &[
             "flux_mw_per_m2",
             "energy_ev",

@@ -57,6 +57,7 @@ pub mod drops;
 pub(crate) mod lanes;
 pub mod lighting;
 mod model;
+mod paper_settings;
 mod parameters;
 mod phenomenon;
 mod raindrop;

@@ -14,6 +14,7 @@ use crate::aovs::AOVS;
 impl RainParameters {
     /// The table `[[rain]]`.
     pub const KIND: TableKind = TableKind {
+        paper: Some(&crate::paper_settings::PAPER),
         first_keys: &["rate_mm_per_h", "distance", "airlight_distance", "splashes.fraction"],
         // Lamps at dusk along a wet street: drops only scatter the light of others.
         scene_defaults: "\

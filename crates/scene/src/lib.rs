@@ -3,6 +3,7 @@
 //! The feature `schema` adds the module `schema`, the JSON schema of scene files.
 
 mod check;
+mod paper;
 pub mod report;
 #[cfg(feature = "schema")]
 pub mod schema;
@@ -25,6 +26,7 @@ use bansho_base::{
 
 pub use self::{
     check::report_build_error,
+    paper::PaperDeparture,
     report::{Positions, SceneError},
     shared::{SharedInstance, SharedTables},
     tables::{

@@ -3,6 +3,7 @@
 //! Parser, schema, defaults, templates, edits, fingerprints and the studio know no table by name: they read a slice of [`TableKind`], the registry,
 //! which a program passes to them.
 
+mod paper;
 mod parameters;
 mod phenomenon;
 mod shared;
@@ -10,6 +11,7 @@ mod shared;
 use crate::parameters::{Parameter, Parameters, TableDescriptor};
 
 pub use self::{
+    paper::{PaperSetting, PaperSettings},
     parameters::TableParameters,
     phenomenon::{BuildContext, ClonePhenomenonTable, PhenomenonTable, ReadPhenomenon},
     shared::{
@@ -52,6 +54,8 @@ pub struct TableKind {
     pub scene_defaults: &'static str,
     /// Keys that determine position or size of a phenomenon: if one is set, the camera of `scene_defaults` may not show it.
     pub placement_keys: &'static [&'static str],
+    /// How it follows the paper of its method to the letter.
+    pub paper: Option<&'static PaperSettings>,
     /// Memory of a phenomenon that is built and was never drawn, with its parameters, bytes.
     pub built_bytes: f64,
 }
@@ -81,6 +85,7 @@ impl TableKind {
             in_the_sky: false,
             scene_defaults: "",
             placement_keys: &[],
+            paper: None,
             built_bytes: 0.0,
         }
     }

@@ -110,6 +110,9 @@ pub(crate) struct CheckArgs {
     /// Scene files; `-` reads one from standard input.
     #[arg(required = true, value_name = "SCENE")]
     pub(crate) scenes: Vec<PathBuf>,
+    /// List what does not follow the papers of the phenomena to the letter.
+    #[arg(long)]
+    pub(crate) paper: bool,
     #[command(flatten)]
     pub(crate) inputs: InputArgs,
 }

@@ -1,8 +1,9 @@
 //! `bansho check`
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use bansho::{
+    Scene,
     base::host::printable::{printable, printable_excerpt},
     job::{self, JobError},
 };
@@ -17,7 +18,7 @@ use crate::{
 pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
     let mut last_error = None;
     for path in &args.scenes {
-        match describe(path, &args.inputs) {
+        match describe(path, &args.inputs, args.paper) {
             Ok(line) => print(&line)?,
             Err(error) => {
                 exit::print_job_error(&error);
@@ -28,8 +29,8 @@ pub(crate) fn run(args: &CheckArgs) -> anyhow::Result<()> {
     last_error.map_or(Ok(()), |error| Err(ReportedError::Job(error).into()))
 }
 
-/// Checks a scene and returns its description.
-fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
+/// Checks a scene and returns its description, with its departures from papers if they are asked for.
+fn describe(path: &Path, inputs: &InputArgs, papers: bool) -> Result<String, JobError> {
     let scene = inputs.read(path, &[])?;
     let (compiled, plan) = job::check_scene(&scene)?;
     for warning in job::remarks(&scene, &compiled, &plan) {
@@ -46,9 +47,25 @@ fn describe(path: &Path, inputs: &InputArgs) -> Result<String, JobError> {
     let names: Vec<&str> = drawn.map(|instance| instance.name.as_str()).collect();
     let names = if names.is_empty() { "no phenomena".to_owned() } else { names.join(", ") };
     let names = printable_excerpt(&names);
+    let departures = if papers { describe_departures(plan.scene()) } else { String::new() };
     Ok(format!(
-        "{}: valid. {width} x {height}, {numbers} at {rate} fps, EV100 {:.1}: {names}\n",
+        "{}: valid. {width} x {height}, {numbers} at {rate} fps, EV100 {:.1}: {names}\n{departures}",
         printable(&scene.name),
         plan.exposure_ev100
     ))
+}
+
+/// What does not follow the papers of a scene's phenomena, a line each.
+fn describe_departures(scene: &Scene) -> String {
+    let of_papers: BTreeSet<&str> =
+        scene.instances.iter().filter_map(|instance| instance.kind.paper).map(|paper| paper.paper).collect();
+    let departures = scene.paper_departures();
+    if of_papers.is_empty() {
+        return "  no phenomenon with a paper\n".to_owned();
+    }
+    if departures.is_empty() {
+        let papers: Vec<&str> = of_papers.into_iter().collect();
+        return format!("  follows {} to the letter, as far as keys tell\n", papers.join(" and "));
+    }
+    departures.iter().map(|departure| format!("  {}\n", printable_excerpt(&departure.to_string()))).collect()
 }

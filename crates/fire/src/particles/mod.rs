@@ -63,6 +63,7 @@
 
 mod error;
 mod model;
+mod paper_settings;
 mod parameters;
 mod past_states;
 mod phenomenon;

@@ -57,6 +57,7 @@ impl FlameParticlesParameters {
     /// The table `[[flame_particles]]`.
     pub const KIND: TableKind = TableKind {
         placement_keys: &["position", "burners", "domain_min", "domain_max"],
+        paper: Some(&super::paper_settings::PAPER),
         first_keys: &[
             "position",
             "particles",

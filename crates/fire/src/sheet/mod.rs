@@ -51,6 +51,7 @@ pub(crate) mod animate;
 pub(crate) mod eddies;
 pub mod equations;
 mod model;
+mod paper_settings;
 mod parameters;
 mod phenomenon;
 pub(crate) mod render;

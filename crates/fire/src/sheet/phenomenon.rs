@@ -36,6 +36,7 @@ impl FlameSheetParameters {
         placement_keys: &["position", "width", "height"],
         // The flame nearly fills the height of the picture.
         scene_defaults: "camera = { position = [0.0, 0.76, 2.75], target = [0.0, 0.76, 0.0] }\n",
+        paper: Some(&super::paper_settings::PAPER),
         first_keys: &[
             "position",
             "width",

@@ -1,0 +1,107 @@
+//! In what a scene departs from the papers of its phenomena.
+
+use bansho_base::{
+    parameters::{Parameters, Table, Value},
+    tables::PaperSetting,
+};
+
+use crate::{Scene, parse_values};
+
+/// A value that is not that of the paper.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{path} = {value}; {paper}: {allowed} ({source_in_paper})")]
+pub struct PaperDeparture {
+    /// Path of the key in the scene.
+    pub path: String,
+    /// Its value, in the syntax of scene files; "none" where it has none.
+    pub value: String,
+    /// Authors of the paper.
+    pub paper: &'static str,
+    /// The values that follow it.
+    pub allowed: String,
+    /// Where the paper says so.
+    pub source_in_paper: &'static str,
+}
+
+impl Scene {
+    /// The values of its phenomena that do not follow their papers to the letter, and those of the scene itself; in the order of the phenomena. Phenomena
+    /// without a paper, and what a paper leaves open, are not listed.
+    #[must_use]
+    pub fn paper_departures(&self) -> Vec<PaperDeparture> {
+        let mut departures: Vec<PaperDeparture> = Vec::new();
+        let whole = self.field_tables();
+        let mut index_of_kind = std::collections::BTreeMap::new();
+        for instance in &self.instances {
+            let index = index_of_kind.entry(instance.kind.key).or_insert(0_usize);
+            let path = instance.kind.path(*index);
+            *index += 1;
+            let Some(paper) = instance.kind.paper.filter(|_| instance.enabled) else { continue };
+            let table = instance.parameters.canonical();
+            let of_table = paper.settings.iter().filter_map(|setting| departure(&table, setting, &format!("{path}.")));
+            let of_scene = paper.scene_settings.iter().filter_map(|setting| departure(&whole, setting, ""));
+            for (path, value, setting) in of_table.chain(of_scene) {
+                // Several phenomena may have the same paper.
+                if departures.iter().all(|departure| departure.path != path) {
+                    let allowed = setting.allowed.iter().map(|value| if value.is_empty() { "none" } else { value });
+                    departures.push(PaperDeparture {
+                        path,
+                        value,
+                        paper: paper.paper,
+                        allowed: allowed.collect::<Vec<_>>().join(" or "),
+                        source_in_paper: setting.source,
+                    });
+                }
+            }
+        }
+        departures
+    }
+
+    /// The tables that are fields of the scene, by their keys.
+    fn field_tables(&self) -> Table {
+        let mut tables = Table::default();
+        tables.push("picture", Value::Table(self.picture.to_table()));
+        tables.push("camera", Value::Table(self.camera.to_table()));
+        tables
+    }
+}
+
+/// Path and value of a key whose value in `table` is not allowed.
+fn departure<'a>(table: &Table, setting: &'a PaperSetting, prefix: &str) -> Option<(String, String, &'a PaperSetting)> {
+    let value = value_at(table, setting.key);
+    let is_allowed = setting.allowed.iter().any(|allowed| match (value, parse(allowed)) {
+        (Some(value), Some(allowed)) => is_same(value, &allowed),
+        (value, allowed) => value.is_none() && allowed.is_none(),
+    });
+    let text = || value.map_or("none".to_owned(), Value::to_string);
+    (!is_allowed).then(|| (format!("{prefix}{}", setting.key), text(), setting))
+}
+
+/// A value in the syntax of scene files; `None` for an empty one.
+fn parse(text: &str) -> Option<Value> {
+    if text.is_empty() {
+        return None;
+    }
+    let table = parse_values(&format!("value = {text}")).ok()?;
+    table.get("value").map(|node| node.value.clone())
+}
+
+fn value_at<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
+    match key.split_once('.') {
+        None => table.get(key).map(|node| &node.value),
+        Some((first, rest)) => match &table.get(first)?.value {
+            Value::Table(inner) => value_at(inner, rest),
+            _ => None,
+        },
+    }
+}
+
+/// Whether two values are the same, wherever they were written.
+fn is_same(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::List(a), Value::List(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_same(&a.value, &b.value))
+        }
+        (Value::Integer(_) | Value::Number(_), Value::Integer(_) | Value::Number(_)) => a.as_number() == b.as_number(),
+        _ => a == b,
+    }
+}
