@@ -73,8 +73,8 @@ pub mod simulate;
 pub use model::Aurora;
 pub use parameters::{
     AuroraParameters, AuroraStage, FieldCharge, FieldParameters, FieldSolver, FoldParameters, NeighborSearch,
-    ParticleParameters, PowerDistribution, PulsationParameters, RayParameters, RelocationParameters, RepulsionKernel,
-    SpectrumShape,
+    ParticleParameters, PowerDistribution, PulsationParameters, RayParameters, RelocationParameters, RepulsionForce,
+    RepulsionKernel, SpectrumShape,
 };
 pub use render::{Blur, BlurParameters, RenderingParameters, Sampling, TrackModel};
 pub use run::AuroraRun;

@@ -144,6 +144,17 @@ bansho_base::choice! {
 }
 
 bansho_base::choice! {
+    /// By which densities the pressure force between two particles is divided.
+    pub enum RepulsionForce {
+        /// By both: particles that repel each other keep their common momentum.
+        BothDensities = "both_densities",
+        /// By that of the neighbor alone, as (2.14) is printed, and by delta_0 instead of the particle's own: where the density varies, the forces of two
+        /// particles on each other differ, and the particles drift together.
+        AsPrinted = "as_printed",
+    }
+}
+
+bansho_base::choice! {
     /// How the energy flux of the sheets is distributed to the particles.
     pub enum PowerDistribution {
         /// Each interval of a sheet has its drawn power, whatever the number of particles there, and `rays` are drawn on it.
@@ -175,6 +186,8 @@ bansho_base::parameters! {
         smoothing_length_cells: Auto<f64> = Auto::Auto, limits(Range::new(0.05, 4.0));
         /// Which particles repel each other.
         neighbor_search: NeighborSearch = NeighborSearch::SupportRadius;
+        /// Densities by which the force (2.14) is divided.
+        repulsion_force: RepulsionForce = RepulsionForce::BothDensities;
         /// How the energy flux is distributed to the particles.
         power_distribution: PowerDistribution = PowerDistribution::BySheetLength;
         /// Decay rate of the velocity; the thesis has no friction.
@@ -186,7 +199,7 @@ bansho_base::parameters! {
         /// Births and deaths when the shape changes.
         relocation: RelocationParameters = RelocationParameters::default();
     }
-    paper: lorentz_weight, repulsion_weight, kernel, smoothing_length_cells, neighbor_search, power_distribution, limit_energy, relocation;
+    paper: lorentz_weight, repulsion_weight, kernel, smoothing_length_cells, neighbor_search, repulsion_force, power_distribution, limit_energy, relocation;
 }
 
 bansho_base::parameters! {

@@ -41,8 +41,10 @@ bansho_base::choice! {
     pub enum Spacing {
         /// Equal arc lengths.
         ArcLength = "arc_length",
-        /// Uniform over the recorded points, eq. (2.1): closer together where the stroke was drawn slowly.
+        /// Uniform over the recorded points, eq. (2.1) with i (m - 1) / (n - 1): closer together where the stroke was drawn slowly.
         Recorded = "recorded",
+        /// Eq. (2.1) as it is printed, with i m / n: the last of n control points is a part 1 / n of the recorded points before the end of the stroke.
+        AsPrinted = "as_printed",
     }
 }
 

@@ -10,7 +10,7 @@ use fearless_simd::dispatch;
 
 use super::{AuroraParticles, neighbor_cells::NeighborCells};
 use crate::{
-    AuroraParameters, NeighborSearch, RepulsionKernel,
+    AuroraParameters, NeighborSearch, RepulsionForce, RepulsionKernel,
     shapes::{FRAME_S, ShapeError, ShapeErrorKind},
     simulate::field::sheet_field::ElectricField,
 };
@@ -96,6 +96,8 @@ pub(super) struct Repulsion {
     force: PressureForce,
     density_kernel: KernelShape,
     stiffness: f32,
+    /// Whether the force is divided as (2.14) is printed.
+    as_printed: bool,
     support: Support,
     masses: Vec<f32>,
     densities: Vec<f32>,
@@ -119,6 +121,7 @@ impl Repulsion {
             force: PressureForce::new(force_kernel),
             density_kernel,
             stiffness: (particles.repulsion * STIFFNESS * cell * cell / (FRAME_S * FRAME_S)) as f32,
+            as_printed: particles.repulsion_force == RepulsionForce::AsPrinted,
             support: Support::new(parameters),
             masses: Vec::new(),
             densities: Vec::new(),
@@ -176,6 +179,12 @@ impl Repulsion {
         } else {
             let (cells, masses) = (&self.cells, &self.masses);
             self.force.compute_accelerations(cells, masses, &self.densities, &self.pressures, &mut self.accelerations);
+        }
+        if self.as_printed {
+            // The accelerations are divided by the particle's own density.
+            for values in &mut self.accelerations {
+                values.iter_mut().zip(&self.densities).for_each(|(value, own)| *value *= own / rest_density as f32);
+            }
         }
         let count = self.densities.len().max(1) as f64;
         let mean = self.densities.iter().map(|density| f64::from(*density)).sum::<f64>() / count;

@@ -82,14 +82,19 @@ pub(crate) fn length_fractions(points: &[DVec2]) -> Vec<f64> {
 /// m/n cuts off the end of the stroke; i (m - 1)/(n - 1) reaches it.
 pub(crate) fn resample_by_index(recorded: &[DVec2], count: usize) -> Vec<DVec2> {
     let last = recorded.len().saturating_sub(1);
-    let mut points = Vec::with_capacity(count);
-    for i in 0..count {
-        let index = (i * last) as f64 / (count - 1).max(1) as f64;
-        let q = index as usize;
-        let p = index - q as f64;
-        points.push(recorded[q.min(last)].lerp(recorded[(q + 1).min(last)], p));
-    }
-    points
+    (0..count).map(|i| at_index(recorded, (i * last) as f64 / (count - 1).max(1) as f64)).collect()
+}
+
+/// Eq. (2.1) as it is printed: the index of P_i is i m/n.
+pub(crate) fn resample_by_printed_index(recorded: &[DVec2], count: usize) -> Vec<DVec2> {
+    (0..count).map(|i| at_index(recorded, (i * recorded.len()) as f64 / count as f64)).collect()
+}
+
+/// The position between M_q and M_(q+1) at an index from 0 to the last.
+fn at_index(recorded: &[DVec2], index: f64) -> DVec2 {
+    let last = recorded.len().saturating_sub(1);
+    let q = index as usize;
+    recorded[q.min(last)].lerp(recorded[(q + 1).min(last)], index - q as f64)
 }
 
 /// A centripetal Catmull-Rom spline through the points of a sketch, without cusps or self-intersections within a
@@ -166,6 +171,19 @@ mod tests {
         let points = resample_by_index(&corner(), 5);
         let expected = [[0.0, 0.0], [1.5, 0.0], [3.0, 0.0], [3.0, 0.5], [3.0, 1.0]];
         assert_eq!(points.iter().map(|p| p.to_array()).collect::<Vec<_>>(), expected);
+    }
+
+    /// m = 3, n = 5: positions 0, 3/5, 6/5, 9/5, and 12/5 beyond the last point.
+    #[test]
+    fn printed_control_points_stop_before_the_end_of_a_long_stroke() {
+        let points = resample_by_printed_index(&corner(), 5);
+        let expected = [[0.0, 0.0], [1.8, 0.0], [3.0, 0.2], [3.0, 0.8], [3.0, 1.0]];
+        for (point, expected) in points.iter().zip(expected) {
+            assert!((*point - DVec2::from(expected)).length() < 1e-12, "{point} {expected:?}");
+        }
+        let stroke: Vec<DVec2> = (0..320).map(|i| DVec2::new(f64::from(i), 0.0)).collect();
+        assert_eq!(resample_by_printed_index(&stroke, 32)[31].x, 310.0);
+        assert_eq!(resample_by_index(&stroke, 32)[31].x, 319.0);
     }
 
     #[test]

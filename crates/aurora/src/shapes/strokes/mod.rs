@@ -14,7 +14,7 @@ use intersection::first_crossing;
 
 use super::{
     SegmentId, ShapeError, ShapeErrorKind, ShapeParameters, SheetParameters, Spacing,
-    geometry::polyline::{Polyline, resample_by_index, smooth_sketch},
+    geometry::polyline::{Polyline, resample_by_index, resample_by_printed_index, smooth_sketch},
 };
 
 /// Points closer than this are merged, km.
@@ -48,6 +48,7 @@ impl DrawnSheet {
         match spacing {
             Spacing::ArcLength => self.line.resample(count),
             Spacing::Recorded => resample_by_index(&self.recorded, count),
+            Spacing::AsPrinted => resample_by_printed_index(&self.recorded, count),
         }
     }
 

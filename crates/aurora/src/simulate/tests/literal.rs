@@ -4,8 +4,12 @@ use bansho_base::{math, math::random::Key};
 
 use super::*;
 use crate::{
-    FieldCharge, FieldSolver, NeighborSearch, PowerDistribution, RayParameters, RelocationParameters, RepulsionKernel,
-    simulate::field::{gauss_seidel_sweep, sheet_charge::scatter, sheet_field::FieldBuilder},
+    FieldCharge, FieldSolver, NeighborSearch, PowerDistribution, RayParameters, RelocationParameters, RepulsionForce,
+    RepulsionKernel,
+    simulate::{
+        field::{gauss_seidel_sweep, sheet_charge::scatter, sheet_field::FieldBuilder},
+        forces::Repulsion,
+    },
 };
 
 /// A straight sheet of so many cells of the grid, by the rules of the thesis, with 600 particles per cell of its length.
@@ -104,6 +108,34 @@ fn the_spline_makes_rays_where_poly6_and_spiky_do_not() {
     let spline_in_cells = mean_contrast(RepulsionKernel::CubicSpline, NeighborSearch::ThreeByThreeCells, 2);
     assert!(spline > 2.0 * poly6_spiky, "{spline} {poly6_spiky}");
     assert!(spline_in_cells > 2.0 * poly6_spiky, "{spline_in_cells} {poly6_spiky}");
+}
+
+/// Common acceleration of all particles of a sheet relative to the root mean square of theirs.
+fn common_acceleration(repulsion_force: RepulsionForce) -> f64 {
+    let mut parameters = literal(8.0, RepulsionKernel::Poly6Spiky);
+    parameters.particles.repulsion_force = repulsion_force;
+    let simulation = simulation(parameters.clone());
+    let mut particles = simulation.particles().clone();
+    // A sheet that is denser toward one of its edges.
+    let cell = parameters.cell_km();
+    for z in &mut particles.positions[1] {
+        let across = f64::from(*z) - 5.0;
+        *z = (5.0 + across + 0.3 * across * across.abs() / cell) as f32;
+    }
+    let rest_density = 300.0 / (cell * cell);
+    let mut repulsion = Repulsion::new(&parameters);
+    repulsion.compute_accelerations(&mut particles, cell, rest_density);
+    let [x, z] = repulsion.accelerations.each_ref().map(|values| values.iter().map(|value| f64::from(*value)));
+    let count = particles.len() as f64;
+    let common = math::hypot(x.clone().sum::<f64>() / count, z.clone().sum::<f64>() / count);
+    let squares = x.map(|value| value * value).sum::<f64>() + z.map(|value| value * value).sum::<f64>();
+    common / math::sqrt(squares / count)
+}
+
+#[test]
+fn the_force_as_printed_lets_particles_drift_together() {
+    let [both, printed] = [RepulsionForce::BothDensities, RepulsionForce::AsPrinted].map(common_acceleration);
+    assert!(both < 1e-5 && printed > 100.0 * both.max(1e-6), "{both} {printed}");
 }
 
 #[test]
