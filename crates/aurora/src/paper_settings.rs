@@ -16,7 +16,7 @@ pub(crate) const PAPER: PaperSettings = PaperSettings {
         PaperSetting::new("particles.neighbor_search", &["\"three_by_three_cells\""], "2.5.1"),
         PaperSetting::new("particles.friction_per_s", &["0"], "(2.19)"),
         PaperSetting::new("particles.fade_s", &["0"], "2.3.4"),
-        PaperSetting::new("particles.power_distribution", &["\"equal\""], "2.4.2"),
+        PaperSetting::new("particles.power_distribution", &["\"equal\"", "\"equal_share\""], "2.4.2"),
         PaperSetting::new("particles.relocation.scale_counts", &["false"], "table 3.3"),
         PaperSetting::new("rays.contrast", &["0"], "2.3.2"),
         PaperSetting::new("folds.amplitude_km", &["0"], "2.2.1"),

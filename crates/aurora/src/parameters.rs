@@ -162,6 +162,8 @@ bansho_base::choice! {
         /// Every particle has the same power, as in the thesis, so that a sheet is bright where particles cluster. The total is that of the sheets when
         /// there are `count` particles.
         Equal = "equal",
+        /// The same, but the total is always that of the sheets: table 3.3 of the thesis may triple the number of particles, and with it the light.
+        EqualShare = "equal_share",
     }
 }
 

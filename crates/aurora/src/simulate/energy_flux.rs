@@ -92,8 +92,13 @@ impl EnergyFlux {
         rays: &RayTable,
         time: f64,
     ) {
-        if self.parameters.particles.power_distribution == PowerDistribution::Equal {
-            self.distribute_equally(particles, refined, time);
+        let count = match self.parameters.particles.power_distribution {
+            PowerDistribution::BySheetLength => None,
+            PowerDistribution::Equal => Some(self.parameters.particles.count as f64),
+            PowerDistribution::EqualShare => Some(particles.fades.iter().map(|fade| f64::from(*fade)).sum()),
+        };
+        if let Some(count) = count {
+            self.distribute_equally(particles, refined, time, count);
             return;
         }
         let lengths = refined.sheet_lengths();
@@ -114,12 +119,11 @@ impl EnergyFlux {
         balance(particles, &totals);
     }
 
-    /// Assigns every particle the same power and energy, as in the thesis: the total power of the sheets over the number of particles that a
-    /// scene asks for, whatever number there is.
-    fn distribute_equally(&self, particles: &mut AuroraParticles, refined: &RefinedShape, time: f64) {
+    /// Assigns every particle the same power and energy, as in the thesis: the total power of the sheets over `count`, whatever number there is.
+    fn distribute_equally(&self, particles: &mut AuroraParticles, refined: &RefinedShape, time: f64, count: f64) {
         let width = 2.0 * self.parameters.half_thickness_km();
         let area: f64 = refined.pieces(|_| 1.0).map(|piece| piece.flux * piece.length_km * width).sum();
-        let power = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * area / self.parameters.particles.count as f64;
+        let power = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * area / count.max(1.0);
         let energy = self.parameters.energy_ev.at(time);
         chunks(particles).into_par_iter().with_max_len(1).for_each(|chunk| {
             for index in 0..chunk.fades.len() {

@@ -202,6 +202,23 @@ fn without_relocation_all_particles_of_the_first_shape_remain() {
 
 /// Every particle has the same power, so that light follows the particles.
 #[test]
+fn an_equal_share_holds_the_light_when_particles_are_born_and_die() {
+    let drawn = |power_distribution| {
+        let mut parameters = literal(24.0, RepulsionKernel::CubicSpline);
+        parameters.flux_mw_per_m2 = 10.0.into();
+        parameters.particles.power_distribution = power_distribution;
+        let mut simulation = simulation(parameters);
+        let before = simulation.particles().len() as f64;
+        (0..60).for_each(|_| simulation.step());
+        (simulation.particles().len() as f64 / before, simulation.particles().power_w() / (10.0 * 1e3 * 240.0 * 20.0))
+    };
+    let (growth, equal) = drawn(PowerDistribution::Equal);
+    let (_, share) = drawn(PowerDistribution::EqualShare);
+    assert!((growth - 1.0).abs() > 0.05 && (equal / growth - 1.0).abs() < 0.02, "{growth} {equal}");
+    assert!((share - 1.0).abs() < 0.01, "{share}");
+}
+
+#[test]
 fn particles_of_equal_power_have_the_power_of_the_sheets_together() {
     let mut parameters = literal(24.0, RepulsionKernel::CubicSpline);
     parameters.flux_mw_per_m2 = 10.0.into();
