@@ -13,7 +13,7 @@ use std::{
 fn asset(line: &str) -> Option<&str> {
     let (key, value) = line.split_once('=')?;
     let path = value.trim().strip_prefix('"')?.split('"').next()?;
-    ["image", "depth", "file"].contains(&key.trim()).then_some(path)
+    ["image", "depth", "albedo", "normal", "file"].contains(&key.trim()).then_some(path)
 }
 
 /// The folder of scenes: a symbolic link in the repository, a folder in the published crate. Where Git does not make links, it is a file.

@@ -7,6 +7,5 @@
 pub mod fog;
 pub mod ground;
 pub mod lamps;
-mod shadow;
 pub mod sky;
 pub mod solids;

@@ -304,7 +304,7 @@ impl Plan {
         fingerprint::hash_table("camera", self.camera.to_table(), &mut hasher);
         fingerprint::hash_table("plate", self.scene.plate.to_table(), &mut hasher);
         let plate = &self.scene.plate;
-        for path in [&plate.image, &plate.depth].into_iter().flatten() {
+        for (_, path) in plate.files() {
             fingerprint::hash_asset(assets, &path.0, number, &mut hasher);
         }
         // The light of the plate of the first frame is used in all frames.

@@ -165,12 +165,18 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
     );
 }
 
-/// The depth, its known points and the exposure of a plate need its image.
+/// The depth, its known points, the surfaces and the exposure of a plate need its image.
 fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
     if scene.plate.image.is_none() && scene.plate.depth.is_some() {
         let span = nearest_span(root, "plate.depth");
         let kind = ProblemKind::Conflict("`depth` needs an `image`".into());
         reader.within("plate", |r| r.within("depth", |r| r.report_at(span, kind)));
+    }
+    for (key, path) in [("albedo", &scene.plate.albedo), ("normal", &scene.plate.normal)] {
+        if scene.plate.image.is_none() && path.is_some() {
+            let kind = ProblemKind::Conflict(format!("`{key}` needs an `image`"));
+            report_build_error(BuildError { key: key.into(), kind }, "plate".into(), root, reader);
+        }
     }
     if scene.plate.image.is_none() && !scene.plate.depth_known.is_empty() {
         let kind = ProblemKind::Conflict("`depth_known` needs an `image`".into());

@@ -34,7 +34,9 @@ pub use self::{
         ground_fit::{GroundFit, PlateView},
         kinds::{self, GLARE_LAYER, PLATE_LAYER},
         picture::{self, DepthKind, FrameRate, PictureParameters, PlateAlpha, PlateParameters},
-        plate::{PlateDepth, PlatePictures, PlateRemark},
+        plate::{PlateDepth, PlatePictures},
+        plate_checks::PlateRemark,
+        plate_surfaces::PlateSurfaces,
     },
     text::{
         edit::{self, operation},
@@ -342,10 +344,10 @@ impl Scene {
 
     /// The paths of all files that the scene names, as they are in its text.
     pub fn asset_paths(&self) -> Vec<String> {
-        let plate = [&self.plate.image, &self.plate.depth].into_iter().flatten();
         let shared = self.tables.iter().flat_map(|table| table.parameters.asset_paths());
-        plate
-            .map(|path| path.0.clone())
+        self.plate
+            .files()
+            .map(|(_, path)| path.0.clone())
             .chain(shared)
             .chain(self.instances.iter().flat_map(|instance| instance.parameters.asset_paths()))
             .collect()
@@ -360,6 +362,11 @@ impl Scene {
     /// Whether the phenomena are composited over a plate.
     pub fn has_plate(&self) -> bool {
         self.plate.image.is_some()
+    }
+
+    /// Whether the lights of the scene light what its plate shows.
+    pub fn lights_plate(&self) -> bool {
+        self.has_plate() && self.plate.albedo.is_some()
     }
 }
 

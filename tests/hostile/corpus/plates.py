@@ -9,6 +9,7 @@ from .case import Case, Content, built
 
 SCENE = 'bansho = 2\n[picture]\nsize = [32, 24]\nframes = 2\n[plate]\nimage = "{}"\n[[flame_sheet]]\n'
 DEPTH = 'bansho = 2\n[picture]\nsize = [32, 24]\nframes = 2\n[plate]\nimage = "flat.png"\ndepth = "{}"\n[[flame_sheet]]\n'
+LIT = 'bansho = 2\n[picture]\nsize = [24, 16]\nframes = 2\n[plate]\nimage = "flat.png"\ndepth = "depth.exr"\nalbedo = "{}"\n{}[[flame_sheet]]\n'
 MEGA = 1_000_000
 LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
@@ -251,5 +252,45 @@ def _kinds() -> list[Case]:
     ]
 
 
+def _lit() -> list[Case]:
+    """Albedo and normals, which a plate needs to be lit."""
+
+    def floats(value: float, names: str = "BGR", width: int = 24) -> bytes:
+        return exr.scan_lines(width, 16, "none", struct.pack("<f", value) * width * len(names), names=names, sample=exr.FLOAT)
+
+    files = {"flat.png": png.flat(24, 16), "depth.exr": floats(3.0, "Z"), "half.exr": floats(0.5)}
+
+    def albedo(name: str, file: str, content: Content, code: int = 3, words: str = "") -> Case:
+        says = rf"^error: scene\.toml:8:10: plate\.albedo: .*({words})"
+        return Case("lit plate", name, ["check", "scene.toml"], code, says, {**files, "scene.toml": LIT.format(file, ""), file: content})
+
+    def normal(name: str, file: str, content: Content, code: int = 3, words: str = "") -> Case:
+        scene = LIT.format("half.exr", f'normal = "{file}"\n')
+        says = rf"^error: scene\.toml:9:10: plate\.normal: .*({words})"
+        return Case("lit plate", name, ["check", "scene.toml"], code, says, {**files, "scene.toml": scene, file: content})
+
+    without_depth = LIT.format("half.exr", 'normal = "half.exr"\n').replace('depth = "depth.exr"\n', "")
+    draws = Case("lit plate", "albedo and normals of no number, drawn", ["render", "scene.toml", "-o", "frame.#.png"], 0,
+                 files={**files, "scene.toml": LIT.format("nan.exr", 'normal = "nan.exr"\n'), "nan.exr": floats(float("nan"))}, leaves=("frame.*.png",))
+    return [
+        albedo("whole", "a.exr", floats(0.5), 0),
+        albedo("albedo above 1", "a.exr", floats(1.5), words="has the value 1.5 at pixel .0, 0.; allowed: 0 to 1"),
+        albedo("albedo below 0", "a.exr", floats(-0.5), words="allowed: 0 to 1"),
+        albedo("infinite albedo", "a.exr", floats(float("inf")), words="allowed: 0 to 1"),
+        albedo("albedo of another shape", "a.exr", floats(0.5, width=16), words="allowed: 24 x 16"),
+        albedo("albedo that is cut off", "a.exr", floats(0.5)[:300], words="damaged"),
+        albedo("albedo that is text", "a.exr", "no picture\n" * 100, words="damaged"),
+        normal("normals", "n.exr", floats(0.5, "ZYX"), 0),
+        normal("normals above 1", "n.exr", floats(2.0), words="allowed: -1 to 1"),
+        normal("infinite normals", "n.exr", floats(float("-inf"), "ZYX"), words="allowed: -1 to 1"),
+        normal("normals of another shape", "n.exr", floats(0.5, width=16), words="allowed: 24 x 16"),
+        normal("normals in a PNG", "n.png", png.flat(24, 16), words="not a supported format of normals"),
+        normal("normals with two channels", "n.exr", floats(0.5, "YX"), words="layer|channel|damaged"),
+        Case("lit plate", "normals without a depth", ["check", "scene.toml"], 3, r"^error: scene\.toml:7:10: plate\.albedo: .*needs a depth",
+             {**files, "scene.toml": without_depth}),
+        draws,
+    ]
+
+
 def cases() -> list[Case]:
-    return _png() + _jpeg() + _exr() + _kinds()
+    return _png() + _jpeg() + _exr() + _kinds() + _lit()

@@ -81,6 +81,15 @@ pub struct DepthMap {
     pub remarks: Vec<PictureRemark>,
 }
 
+/// The normals of a picture, as its file has them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalMap {
+    /// Components x, y and z; all 0 or not a number where the normal is unknown.
+    pub values: Image<3>,
+    /// What users should know about how the file was read.
+    pub remarks: Vec<PictureRemark>,
+}
+
 /// Which layers of a picture are read; by default those that conventions of renderers name.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct PictureLayers {
@@ -252,6 +261,9 @@ pub enum AssetProblem {
     /// The extension of its name is not that of a supported format of depth.
     #[error("is not a supported depth format; allowed: .exr, .png, .pfm, .npy, .tif, .tiff")]
     UnknownDepthKind,
+    /// The extension of its name is not that of a supported format of normals.
+    #[error("is not a supported format of normals; allowed: .exr")]
+    UnknownNormalKind,
     /// It is of a format that is known, and not read.
     #[error("is {format}, which Bansho does not read; {advice}")]
     UnsupportedFormat {
@@ -345,6 +357,18 @@ pub trait Assets: Send + Sync {
             Some(values) => Ok(Arc::new(DepthMap { values, remarks: picture.remarks.clone() })),
             None => Err(AssetError { path: path.to_owned(), problem: AssetProblem::NoChannel("Z".into()) }),
         }
+    }
+
+    /// The normals at `path`, for frame `frame` if it is a sequence: the colors of the picture, as they are.
+    ///
+    /// # Errors
+    /// The asset is missing, damaged, too large or has no normals.
+    fn normals(&self, path: &str, frame: i64) -> Result<Arc<NormalMap>, AssetError> {
+        let picture = self.picture(path, frame)?;
+        let pixels = picture.color.pixels().iter().map(|&[x, y, z, _]| [x, y, z]).collect();
+        let values = Image::from_pixels(picture.color.width(), picture.color.height(), pixels);
+        let missing = || AssetError { path: path.to_owned(), problem: AssetProblem::NoChannel("X".into()) };
+        Ok(Arc::new(NormalMap { values: values.ok_or_else(missing)?, remarks: picture.remarks.clone() }))
     }
 
     /// All triangles of the scene at `path`, in its own coordinates.

@@ -1,6 +1,7 @@
 //! The interface between phenomena (fire, rain, aurora, ...) and the renderer.
 
 pub(crate) mod aov;
+pub mod light_batch;
 pub mod strip;
 pub mod surroundings;
 

@@ -187,6 +187,8 @@ pub struct Publication {
     /// Number of equal parts of the exposure, a power of two, in each of which the lights hardly move or change; 0 or 1 if they stand still. `lights` are those
     /// in its middle.
     pub light_parts: usize,
+    /// Length of the longest path of a flame or lamp during the exposure, m; 0 where they stand still, though flames flicker.
+    pub light_motion: f64,
 }
 
 impl Publication {
@@ -198,6 +200,7 @@ impl Publication {
         self.shadow_casters.extend_from_slice(&other.shadow_casters);
         self.shadow_motion = self.shadow_motion.max(other.shadow_motion);
         self.light_parts = self.light_parts.max(other.light_parts);
+        self.light_motion = self.light_motion.max(other.light_motion);
     }
 }
 
@@ -301,6 +304,8 @@ pub struct Surroundings<'a> {
     pub reflection: Option<&'a Reflection>,
     /// With a plate: the background of all phenomena in that mirror, plate and sky.
     pub backdrop: Option<&'a Backdrop>,
+    /// Whether the renderer lights what the plate shows, so that the plate's own ground must not.
+    pub plate_is_lit: bool,
     /// Lights, extinction and occluders of the other phenomena and of the scene itself. Where the camera stands still, lights that move are several along
     /// their paths, each with its share of the light; else they are where they are in the middle of the exposure.
     pub others: Publication,
@@ -351,6 +356,7 @@ impl<'a> Surroundings<'a> {
             sky: Sky::DARK,
             reflection: None,
             backdrop: None,
+            plate_is_lit: false,
             others: Publication::default(),
             light_parts: Vec::new(),
         }

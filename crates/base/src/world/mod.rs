@@ -3,5 +3,6 @@
 pub mod air;
 pub mod gravity;
 pub mod occluder;
+pub mod shadow;
 pub mod sky;
 pub mod wind;

@@ -53,6 +53,21 @@ pub enum Occluder {
 }
 
 impl Occluder {
+    /// Whether two lists hold the same solids. Distance fields are compared by their place in memory, since they are large.
+    pub fn are_same(some: &[Self], others: &[Self]) -> bool {
+        some.len() == others.len() && some.iter().zip(others).all(|(a, b)| a.is_same(b))
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (
+                Self::Mesh { distance, placement },
+                Self::Mesh { distance: other_distance, placement: other_placement },
+            ) => Arc::ptr_eq(distance, other_distance) && placement == other_placement,
+            _ => self == other,
+        }
+    }
+
     /// Distance from `point` to the surface, m; negative inside.
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         match self {

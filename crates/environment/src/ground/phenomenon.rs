@@ -8,6 +8,7 @@ use bansho_base::{
     math::{DVec2, DVec3},
     phenomenon::{
         Phenomenon, PhenomenonInfo, Prepared, Run,
+        light_batch::RelativeLight,
         strip::{DepthInterval, PathCameras, Shutter, View, parts_of_motion},
         surroundings::{Backdrop, Occluder, Publication, Surroundings},
     },
@@ -18,7 +19,6 @@ use super::{
     Ground, GroundKind, GroundParameters,
     hits::{HORIZON, RowDepths},
     lake,
-    lighting::GroundLight,
     row_cache::LightInputs,
     sample::SampledImage,
     shade::PreparedGround,
@@ -56,7 +56,12 @@ impl Run for Ground {
         Publication { occluders: vec![half_space], ..Publication::default() }
     }
 
-    fn depth_intervals(&self, _view: &View, _surroundings: &Surroundings) -> Vec<DepthInterval> {
+    fn depth_intervals(&self, _view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {
+        // Dry ground of a plate that is lit itself adds nothing.
+        let is_dry = self.parameters.wetness.constant() == Some(0.0);
+        if self.parameters.kind == GroundKind::Plate && surroundings.plate_is_lit && is_dry {
+            return Vec::new();
+        }
         vec![DepthInterval { near: 0.0, far: HORIZON }]
     }
 
@@ -86,6 +91,7 @@ impl Run for Ground {
             wetness,
             lights: others.lights.clone(),
             shadow_casters: others.shadow_casters.clone(),
+            plate_is_lit: surroundings.plate_is_lit,
             sky: surroundings.sky,
             backdrop: backdrop.as_ref().map(|backdrop| backdrop.image.clone()),
         };
@@ -99,7 +105,7 @@ impl Run for Ground {
             wetness,
             camera_height,
             row_depths: RowDepths::new(view, camera_height),
-            lights: others.lights.iter().map(|light| GroundLight::new(light, view.camera.position)).collect(),
+            lights: others.lights.iter().map(|light| RelativeLight::new(light, view.camera.position)).collect(),
             night_sky: OnceLock::new(),
             has_film,
             lake,

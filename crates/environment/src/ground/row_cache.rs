@@ -39,29 +39,20 @@ pub(super) struct LightInputs {
     pub(super) wetness: f64,
     pub(super) lights: Vec<Light>,
     pub(super) shadow_casters: Vec<Occluder>,
+    pub(super) plate_is_lit: bool,
     pub(super) sky: Sky,
     pub(super) backdrop: Option<Image<4>>,
 }
 
 impl PartialEq for LightInputs {
     fn eq(&self, other: &Self) -> bool {
-        let Self { wetness, lights, shadow_casters, sky, backdrop } = self;
+        let Self { wetness, lights, shadow_casters, plate_is_lit, sky, backdrop } = self;
         *wetness == other.wetness
+            && *plate_is_lit == other.plate_is_lit
             && *lights == other.lights
             && *sky == other.sky
-            && shadow_casters.len() == other.shadow_casters.len()
-            && shadow_casters.iter().zip(&other.shadow_casters).all(|(a, b)| is_same_occluder(a, b))
+            && Occluder::are_same(shadow_casters, &other.shadow_casters)
             && *backdrop == other.backdrop
-    }
-}
-
-/// Whether two occluders are the same. Distance fields are compared by their place in memory, since they are large.
-fn is_same_occluder(a: &Occluder, b: &Occluder) -> bool {
-    match (a, b) {
-        (Occluder::Mesh { distance, placement }, Occluder::Mesh { distance: other, placement: at }) => {
-            Arc::ptr_eq(distance, other) && placement == at
-        }
-        _ => a == b,
     }
 }
 

@@ -10,6 +10,7 @@ use bansho_base::{
         simd::{LANES, Lanes, Real, any_positive},
     },
     phenomenon::{
+        light_batch::RelativeLight,
         strip::View,
         surroundings::{Backdrop, Surroundings},
     },
@@ -20,7 +21,7 @@ use fearless_simd::prelude::*;
 use super::{
     LakeFrame,
     hits::{Hits, RowDepths},
-    lighting::{GroundLight, Shadows, array},
+    lighting::{Shadows, array},
     parameters::{GroundKind, GroundParameters},
     row_cache::{CachedRows, GroundLightBatch},
     sample::SampledImage,
@@ -66,7 +67,7 @@ pub(super) struct PreparedGround<'a> {
     pub(super) camera_height: f64,
     pub(super) row_depths: RowDepths,
     /// Those of the surroundings.
-    pub(super) lights: Vec<GroundLight>,
+    pub(super) lights: Vec<RelativeLight>,
     /// The sky, if it is a night: tabulated by the first thread that needs it.
     pub(super) night_sky: OnceLock<Option<NightSky>>,
     /// Whether there is a film of water between puddles.
@@ -122,9 +123,12 @@ impl PreparedGround<'_> {
         // A puddle mirrors the picture instead, so that the film and the puddle share the ground.
         let glossy = (one - puddle) * Lanes::splat(simd, self.wetness as f32);
         let albedo = self.albedo(simd, samples);
+        // What the plate shows is lit with the plate.
+        let is_lit = self.parameters.kind == GroundKind::Plate && self.surroundings.plate_is_lit;
+        let per_illuminance = if is_lit { 0.0 } else { 1.0 / PI };
         let mut batch = [[0.0; LANES]; 4];
         for c in 0..3 {
-            let diffuse = light.illuminance[c] * albedo[c] * Lanes::splat(simd, 1.0 / PI);
+            let diffuse = light.illuminance[c] * albedo[c] * Lanes::splat(simd, per_illuminance);
             let sum = if film.is_some() { glossy.fma(light.specular[c], diffuse) } else { diffuse };
             (hits.coverage * sum).store_slice(&mut batch[c]);
         }

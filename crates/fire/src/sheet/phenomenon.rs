@@ -210,8 +210,13 @@ struct Foreshortening {
 impl Run for FlameSheet {
     fn publish(&self, shutter: Shutter) -> Publication {
         let lights = self.flames.iter().flat_map(|flame| self.point_lights(flame, shutter.middle())).collect();
-        let light_parts = self.flames.iter().map(|flame| self.light_parts(flame, shutter)).max().unwrap_or(1);
-        Publication { lights, light_parts, ..Publication::default() }
+        let (mut light_parts, mut light_motion) = (1, 0.0_f64);
+        for flame in &self.flames {
+            let path = self.path(flame, shutter);
+            light_parts = light_parts.max(self.light_parts(flame, path, shutter));
+            light_motion = light_motion.max(path);
+        }
+        Publication { lights, light_parts, light_motion, ..Publication::default() }
     }
 
     fn depth_intervals(&self, view: &View, surroundings: &Surroundings) -> Vec<DepthInterval> {

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use bansho_base::host::assets::{DepthMap, Picture, PictureLayers};
+use bansho_base::host::assets::{DepthMap, NormalMap, Picture, PictureLayers};
 
 /// A file, and the layers of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,7 +29,13 @@ impl MemoryBytes for DepthMap {
     }
 }
 
-/// Pictures or depths in the order of their last use, the latest at the end.
+impl MemoryBytes for NormalMap {
+    fn memory_bytes(&self) -> usize {
+        size_of_val(self.values.pixels())
+    }
+}
+
+/// Pictures, depths or normals in the order of their last use, the latest at the end.
 #[derive(Debug)]
 pub(crate) struct PictureCache<T> {
     entries: Vec<(PictureKey, Arc<T>)>,

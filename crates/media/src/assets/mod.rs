@@ -14,7 +14,7 @@ use std::{
 
 use bansho_base::{
     geometry::{mesh::Mesh, strokes::Drawing},
-    host::assets::{AssetError, AssetProblem, Assets, DepthMap, Picture, PictureLayers},
+    host::assets::{AssetError, AssetProblem, Assets, DepthMap, NormalMap, Picture, PictureLayers},
 };
 
 use self::{
@@ -35,9 +35,10 @@ use crate::{
     tiff, webp,
 };
 
-/// Largest size of the cache of pictures, and of that of depths, bytes. The last one is always kept.
+/// Largest size of the cache of pictures, and of those of depths and normals, bytes. The last one is always kept.
 const CACHE_BYTES: usize = 512 << 20;
 const DEPTH_CACHE_BYTES: usize = 128 << 20;
+const NORMAL_CACHE_BYTES: usize = 256 << 20;
 
 /// Limits on the files that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -71,6 +72,7 @@ pub struct FileAssets {
 struct AssetCache {
     pictures: PictureCache<Picture>,
     depths: PictureCache<DepthMap>,
+    normals: PictureCache<NormalMap>,
     meshes: HashMap<PathBuf, Arc<Mesh>>,
     drawings: HashMap<PathBuf, Arc<Drawing>>,
     digests: HashMap<PathBuf, [u8; 32]>,
@@ -81,13 +83,15 @@ impl AssetCache {
     fn used(&self) -> u64 {
         let meshes = self.meshes.values().map(|mesh| mesh.memory_bytes());
         let drawings = self.drawings.values().map(|drawing| drawing.memory_bytes());
-        (self.pictures.bytes() + self.depths.bytes()) as u64 + meshes.chain(drawings).sum::<u64>()
+        (self.pictures.bytes() + self.depths.bytes() + self.normals.bytes()) as u64
+            + meshes.chain(drawings).sum::<u64>()
     }
 
     /// Evicts all pictures, and the meshes and drawings without other users.
     fn evict_unused(&mut self) {
         self.pictures.clear();
         self.depths.clear();
+        self.normals.clear();
         self.meshes.retain(|_, mesh| Arc::strong_count(mesh) > 1);
         self.drawings.retain(|_, drawing| Arc::strong_count(drawing) > 1);
     }
@@ -335,6 +339,18 @@ pub fn decode_depth(
     }
 }
 
+/// Decodes normals from the bytes of a file with this `extension` (without the dot): EXR.
+///
+/// # Errors
+/// As [`decode_picture`], or no normals.
+pub fn decode_normals(bytes: &[u8], extension: &str, limit: MemoryLimit) -> Result<NormalMap, AssetProblem> {
+    match formats::picture_format(bytes, extension) {
+        Ok(PlateFormat::Exr) => exr::decode::decode_normals(bytes, limit),
+        Err(problem @ AssetProblem::UnsupportedFormat { .. }) => Err(problem),
+        _ => Err(AssetProblem::UnknownNormalKind),
+    }
+}
+
 impl Assets for FileAssets {
     fn picture(&self, path: &str, frame: i64) -> Result<Arc<Picture>, AssetError> {
         self.picture_layers(path, frame, &PictureLayers::default())
@@ -367,6 +383,20 @@ impl Assets for FileAssets {
         let depth = Arc::new(depth.map_err(|problem| numbered_error(&key.path, problem))?);
         self.lock_cache().depths.insert(key, depth.clone(), DEPTH_CACHE_BYTES);
         Ok(depth)
+    }
+
+    fn normals(&self, path: &str, frame: i64) -> Result<Arc<NormalMap>, AssetError> {
+        let key = PictureKey { path: self.resolve(path, frame)?, layers: PictureLayers::default() };
+        if let Some(normals) = self.lock_cache().normals.get(&key) {
+            return Ok(normals);
+        }
+        let normals = self.within_limit(|limit| {
+            let file = self.read(&key.path, limit.available())?;
+            decode_normals(&file, extension(&key.path), limit)
+        });
+        let normals = Arc::new(normals.map_err(|problem| numbered_error(&key.path, problem))?);
+        self.lock_cache().normals.insert(key, normals.clone(), NORMAL_CACHE_BYTES);
+        Ok(normals)
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {

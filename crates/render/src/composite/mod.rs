@@ -13,8 +13,14 @@ pub(crate) mod moving_members;
 pub(crate) mod plate;
 pub(crate) mod plate_cache;
 mod plate_light;
+pub(crate) mod plate_lighting;
+mod plate_mapping;
+mod plate_shadows;
+pub(crate) mod plate_surface;
+pub(crate) mod plate_transport;
 pub(crate) mod refraction;
 pub(crate) mod slices;
+mod standing_lights;
 pub(crate) mod strips;
 
 pub(crate) use plate_light::{plate_light, plate_light_remark};

@@ -1,7 +1,9 @@
-//! The plate of a frame, resampled to the picture: exposed colors, and depth for occlusion.
+//! The plate of a frame, resampled to the picture: exposed colors, depth for occlusion, and surfaces for light.
+
+use std::sync::Arc;
 
 use bansho_base::{
-    camera::{Camera, Lens},
+    camera::Camera,
     color::{self, AlphaConvention},
     host::{
         assets::{Assets, Encoding, Picture, PictureAlpha},
@@ -12,8 +14,12 @@ use bansho_base::{
     parameters::BuildError,
 };
 
+use super::{
+    plate_mapping::{PlateMapping, depth_of_lens, filter_taps},
+    plate_surface::{PlateSurface, SurfaceInputs},
+};
 use crate::plan::Plan;
-use bansho_scene::{DepthKind, PlateDepth, PlatePictures};
+use bansho_scene::{PlateDepth, PlatePictures};
 
 /// A plate, as large as the picture with its overscan.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +30,8 @@ pub(crate) struct PlateFrame {
     pub(crate) is_transparent: bool,
     /// Depth in the convention of the camera's lens, m.
     pub(crate) depth: Option<Image<1>>,
+    /// The surfaces that it shows, if lights light them.
+    pub(crate) surface: Option<Arc<PlateSurface>>,
 }
 
 /// The plate of frame `number` for `camera`.
@@ -32,77 +40,26 @@ pub(crate) struct PlateFrame {
 /// The picture or its depth cannot be read.
 pub(crate) fn load(plan: &Plan, assets: &dyn Assets, number: i64, camera: &Camera) -> Result<PlateFrame, BuildError> {
     let read = plan.scene.plate.read_frame(assets, number, &plan.plate_view(number))?;
-    let Some(PlatePictures { image, alpha, depth, .. }) = read else {
+    let Some(PlatePictures { image, alpha, depth: plate_depth, surfaces, .. }) = read else {
         return Ok(PlateFrame::default());
     };
     let mapping = PlateMapping::new(plan, [image.color.width(), image.color.height()]);
     let color = resample_color(plan, &image, alpha, &mapping);
-    let mut depth = depth.map(|depth| resample_depth(camera, &depth, &mapping));
+    let mut depth = plate_depth.as_ref().map(|depth| resample_depth(camera, depth, &mapping));
     let is_transparent = alpha != PictureAlpha::Opaque;
     if let Some(depth) = depth.as_mut().filter(|_| is_transparent) {
         // What is not there hides nothing, whatever depth the file gives it.
         let both = depth.pixels_mut().iter_mut().zip(color.pixels());
         both.filter(|(_, [.., alpha])| *alpha <= 0.0).for_each(|(depth, _)| *depth = [f32::INFINITY]);
     }
-    Ok(PlateFrame { color: Some(color), is_transparent, depth })
-}
-
-/// The mapping between pixels of the picture and of the plate. The plate covers the picture, centered; what exceeds it is cropped.
-pub(crate) struct PlateMapping {
-    picture: [usize; 2],
-    plate: [usize; 2],
-    overscan: usize,
-    /// Side of a picture pixel, plate pixels.
-    scale: f64,
-    offset: [f64; 2],
-}
-
-impl PlateMapping {
-    pub(crate) fn new(plan: &Plan, plate: [usize; 2]) -> Self {
-        let overscan = plan.overscan;
-        let [across, down] = [0, 1].map(|axis| plate[axis] as f64 / plan.size[axis] as f64);
-        let scale = across.min(down);
-        let offset = [0, 1].map(|axis| 0.5 * (plate[axis] as f64 - scale * plan.size[axis] as f64));
-        Self { picture: plan.size.map(|side| side + 2 * overscan), plate, overscan, scale, offset }
-    }
-
-    /// Position on the plate, in its pixels, of the center of a picture pixel.
-    fn plate_position(&self, axis: usize, pixel: usize) -> f64 {
-        (pixel as f64 + 0.5 - self.overscan as f64) * self.scale + self.offset[axis]
-    }
-
-    /// Position in the picture without overscan, in its pixels, of the center of a plate pixel.
-    pub(crate) fn picture_position(&self, axis: usize, pixel: usize) -> f64 {
-        (pixel as f64 + 0.5 - self.offset[axis]) / self.scale
-    }
-
-    fn covers(&self, axis: usize, pixel: usize) -> bool {
-        (0.0..=self.plate[axis] as f64).contains(&self.plate_position(axis, pixel))
-    }
-}
-
-/// A plate pixel along an axis, and its weight.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct FilterTap {
-    pixel: usize,
-    weight: f32,
-}
-
-/// The taps of one picture pixel along an axis: a triangle filter whose radius is the larger side of a pixel of both.
-fn filter_taps(mapping: &PlateMapping, axis: usize, pixel: usize) -> Vec<FilterTap> {
-    let radius = mapping.scale.max(1.0);
-    let center = mapping.plate_position(axis, pixel) - 0.5;
-    let mut taps: Vec<FilterTap> = Vec::new();
-    for sample in (center - radius).floor() as i64..=(center + radius).ceil() as i64 {
-        let weight = 1.0 - (sample as f64 - center).abs() / radius;
-        if weight > 1e-9 {
-            let pixel = sample.clamp(0, mapping.plate[axis] as i64 - 1) as usize;
-            taps.push(FilterTap { pixel, weight: weight as f32 });
+    let surface = match (&surfaces, &depth, &plate_depth) {
+        (Some(surfaces), Some(depth), Some(plate_depth)) => {
+            let inputs = SurfaceInputs { color: &color, depth, plate_depth, surfaces };
+            Some(Arc::new(PlateSurface::new(plan, camera, &inputs)))
         }
-    }
-    let total: f32 = taps.iter().map(|tap| tap.weight).sum();
-    taps.iter_mut().for_each(|tap| tap.weight /= total);
-    taps
+        _ => None,
+    };
+    Ok(PlateFrame { color: Some(color), is_transparent, depth, surface })
 }
 
 fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: &PlateMapping) -> Image<4> {
@@ -197,21 +154,12 @@ fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &PlateMapping) -
                     (position as usize).min(depth.size[axis] - 1)
                 });
                 let meters = depth.scale.meters_of(values[row * width + column]);
-                pixel[0] = depth_of_lens(camera, depth.scale.kind, meters, x, y) as f32;
+                pixel[0] =
+                    depth_of_lens(camera, depth.scale.kind, meters, DVec2::new(x as f64 + 0.5, y as f64 + 0.5)) as f32;
             }
         }
     });
     image
-}
-
-/// Depth in the convention of the camera's lens: along the axis for perspective, else the distance.
-fn depth_of_lens(camera: &Camera, kind: DepthKind, meters: f64, x: usize, y: usize) -> f64 {
-    if camera.lens != Lens::Perspective || kind != DepthKind::Distance {
-        return meters;
-    }
-    // Its length is the distance of the point at depth 1.
-    let direction = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-    meters / direction.map_or(1.0, |direction| direction.length())
 }
 
 #[cfg(test)]
@@ -250,21 +198,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn a_plate_of_the_pictures_size_is_taken_pixel_by_pixel() {
-        let mapping = PlateMapping { picture: [4, 3], plate: [4, 3], overscan: 0, scale: 1.0, offset: [0.0, 0.0] };
-        for pixel in 0..4 {
-            assert_eq!(filter_taps(&mapping, 0, pixel), [FilterTap { pixel, weight: 1.0 }]);
-        }
-    }
-
-    #[test]
-    fn a_smaller_picture_averages_and_never_reaches_outside() {
-        let mapping = PlateMapping { picture: [2, 2], plate: [8, 8], overscan: 0, scale: 4.0, offset: [0.0, 0.0] };
-        let taps = filter_taps(&mapping, 0, 0);
-        assert!((taps.iter().map(|tap| tap.weight).sum::<f32>() - 1.0).abs() < 1e-6);
-        assert!(taps.len() > 5 && taps.iter().all(|tap| tap.pixel < 8));
     }
 }

@@ -8,7 +8,7 @@ use bansho_base::{
     world::sky::{ElevationProfile, ElevationSample},
 };
 
-use super::plate::PlateMapping;
+use super::plate_mapping::PlateMapping;
 use crate::{compiled::CompiledScene, plan::Plan, plate_boxes::BRIGHTEST_LUMINANCE};
 
 /// The light from all elevations, as the plate of the first frame shows it through the camera at time 0; 1.0 is display white. `None`

@@ -30,7 +30,7 @@ impl Shot {
     /// # Errors
     /// The observer asked to stop, or the plate cannot be read.
     pub fn draw<T: Target>(&mut self, target: &T, observer: &dyn Observer) -> Result<T::Frame, RenderError> {
-        let plate = {
+        let mut plate = {
             let _stage = StageGuard::begin(observer, Stage::Load);
             let ShotContext { compiled, plan, .. } = &self.context;
             let plate = self.plates.frame(compiled, plan, self.number);
@@ -39,9 +39,13 @@ impl Shot {
         let view = self.context.plan.view_at(self.time);
         let preparing = StageGuard::begin(observer, Stage::Prepare);
         let publications = self.publications(view.shutter, observer);
+        if plate.surface.is_some() {
+            drop(plate);
+            plate = self.lit_plate(view.shutter, &publications, observer)?;
+        }
         let mirrored = match self.mirror(&view, &publications) {
             Some(SceneMirror { mirror, pixel_size, .. }) => {
-                self.plates.mirrored(&self.context.plan, mirror, pixel_size, observer)?
+                self.plates.mirrored(&self.context.plan, &plate, mirror, pixel_size, observer)?
             }
             None => Arc::default(),
         };

@@ -3,6 +3,7 @@
 mod continuing;
 mod data;
 mod draw;
+mod lit_plate;
 mod reflection;
 pub mod snapshot;
 pub(crate) mod stepping;

@@ -24,6 +24,7 @@ pub(crate) fn surroundings<'a>(
         sky: context.sky(shutter.middle()),
         reflection: mirror.and_then(|mirror| mirror.picture.as_ref()),
         backdrop: mirror.and_then(|mirror| mirror.backdrop.as_ref()),
+        plate_is_lit: context.plan.scene.lights_plate(),
         others: others(context, publications, index, shutter),
         light_parts: Vec::new(),
     }

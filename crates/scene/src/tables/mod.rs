@@ -6,3 +6,5 @@ pub(crate) mod ground_fit;
 pub mod kinds;
 pub mod picture;
 pub(crate) mod plate;
+pub(crate) mod plate_checks;
+pub(crate) mod plate_surfaces;

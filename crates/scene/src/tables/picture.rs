@@ -184,6 +184,12 @@ bansho_base::parameters! {
         /// Points whose distance along the camera's axis is known, as [x, y, meters], in pixels of the image from its upper left corner. From two or more of them,
         /// scale and shift of an inverse depth are found by least squares.
         depth_known: Vec<[f64; 3]> = Vec::new(), limits(Length { min: 0, max: 1000, item: KNOWN_DEPTH });
+        /// Diffuse color of what the image shows: an EXR of linear values, or PNG, JPEG, WebP or TIFF in sRGB, from 0 to 1. With it, the fires and lamps that are drawn
+        /// light what the plate shows. The plate needs a depth.
+        albedo: Option<AssetPath> = None;
+        /// Normals of what the image shows: an EXR with the channels X, Y and Z (or R, G and B) from -1 to 1, as the camera sees them: to the right, up, and toward the
+        /// viewer. The default, also where they are 0, is the normal of the depth.
+        normal: Option<AssetPath> = None;
         /// Exposure value at ISO 100 with which it was taken, so that its white is 1.2 * 2^EV cd/m^2: 15 in sunshine, 12 under heavy clouds, 4 in
         /// a lit street at night. "auto": that of the file (Exif, EXR), else an assumed value.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-MAX_EV100, MAX_EV100)), unit("EV");

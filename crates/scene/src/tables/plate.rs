@@ -5,13 +5,15 @@ use std::sync::Arc;
 use bansho_base::{
     color::AlphaConvention,
     host::assets::{AssetError, AssetProblem, Assets, DepthMap, Picture, PictureAlpha, PictureLayers, PictureRemark},
-    parameters::{BuildError, ProblemKind},
+    parameters::{AssetPath, BuildError},
 };
 
 use super::{
-    depth::{self, DepthDoubt, DepthFit, DepthScale, DepthValues, KnownDepthError},
-    ground_fit::{self, GroundFit, PlateView},
+    depth::{self, DepthScale, DepthValues, KnownDepthError},
+    ground_fit::{self, PlateView},
     picture::{DepthKind, PlateAlpha, PlateParameters},
+    plate_checks::{PlateRemark, build_error, check_shape, conflict, file_remarks, size},
+    plate_surfaces::PlateSurfaces,
 };
 
 /// The pictures of a plate in one frame.
@@ -22,6 +24,8 @@ pub struct PlatePictures {
     pub alpha: PictureAlpha,
     /// Its depth.
     pub depth: Option<PlateDepth>,
+    /// The surfaces that it shows, if lights light them.
+    pub surfaces: Option<PlateSurfaces>,
     remarks: Vec<PlateRemark>,
 }
 
@@ -60,74 +64,14 @@ impl PlateDepth {
     }
 }
 
-/// What users should know about the pictures of a plate.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PlateRemark {
-    /// About a file.
-    #[error("`{key}`: {remark}")]
-    File {
-        /// The key of the file.
-        key: &'static str,
-        /// What is to be known.
-        remark: PictureRemark,
-    },
-    /// The depth has another size than the image.
-    #[error(
-        "`depth` has {} x {} pixels and the image {} x {}: the nearest depth value is used for each pixel",
-        .depth[0], .depth[1], .image[0], .image[1]
-    )]
-    DepthSize {
-        /// Size of the depth, pixels.
-        depth: [usize; 2],
-        /// Size of the image, pixels.
-        image: [usize; 2],
-    },
-    /// The depth has negative values alone.
-    #[error(
-        "the depth is negative, as z of a camera that looks toward -z, so its values are used without their sign: {nearest} is the nearest, {farthest} the \
-         farthest"
-    )]
-    NegativeDepth {
-        /// Largest value.
-        nearest: f32,
-        /// Smallest value.
-        farthest: f32,
-    },
-    /// The depth hides nothing, or everything.
-    #[error("the depth: {0}")]
-    DepthDoubt(DepthDoubt),
-    /// Scale and shift were found from known depths.
-    #[error("`depth_known`: {0}")]
-    DepthFit(DepthFit),
-    /// Scale and shift were found from the ground of the scene.
-    #[error("`depth_kind`: {0}")]
-    GroundFit(GroundFit),
-}
-
-fn size(picture: &Picture) -> [usize; 2] {
-    [picture.color.width(), picture.color.height()]
-}
-
-/// Whether two sizes have the same shape, up to the rounding of whole pixels.
-fn same_shape([width, height]: [usize; 2], [other_width, other_height]: [usize; 2]) -> bool {
-    let (scaled, exact) = ((width * other_height) as f64, (other_width * height) as f64);
-    let rounding = width.max(height).max(other_width).max(other_height) as f64;
-    (scaled - exact).abs() <= rounding
-}
-
-fn file_remarks(key: &'static str, remarks: &[PictureRemark]) -> impl Iterator<Item = PlateRemark> {
-    remarks.iter().map(move |remark| PlateRemark::File { key, remark: remark.clone() })
-}
-
-fn build_error(key: &str, kind: impl Into<ProblemKind>) -> BuildError {
-    BuildError { key: key.to_owned(), kind: kind.into() }
-}
-
-fn conflict(key: &str, reason: impl ToString) -> BuildError {
-    build_error(key, ProblemKind::Conflict(reason.to_string()))
-}
-
 impl PlateParameters {
+    /// The files that it names, with their keys.
+    pub fn files(&self) -> impl Iterator<Item = (&'static str, &AssetPath)> {
+        let Self { image, depth, albedo, normal, .. } = self;
+        let files = [("image", image), ("depth", depth), ("albedo", albedo), ("normal", normal)];
+        files.into_iter().filter_map(|(key, path)| Some((key, path.as_ref()?)))
+    }
+
     /// The layers of the image that it chooses.
     pub fn layers(&self) -> PictureLayers {
         let depth = self.depth_layer.clone().filter(|_| self.depth.is_none());
@@ -160,8 +104,8 @@ impl PlateParameters {
     /// Reads the plate of frame `frame`, taken from `view`; `None` where the scene has none.
     ///
     /// # Errors
-    /// A picture cannot be read, the depth picture has no depth, it has another shape than the image, the known depths contradict it, or scale and shift
-    /// would have to be found from ground that the plate does not show.
+    /// A picture cannot be read, the depth picture has no depth, a file has another shape than the image, the known depths contradict it, scale and shift
+    /// would have to be found from ground that the plate does not show, or its surfaces have no depth or impossible values.
     pub fn read_frame(
         &self,
         assets: &dyn Assets,
@@ -179,7 +123,8 @@ impl PlateParameters {
         if depth.is_none() && !self.depth_known.is_empty() {
             return Err(conflict("depth_known", KnownDepthError::NoDepth));
         }
-        Ok(Some(PlatePictures { image, alpha, depth, remarks }))
+        let surfaces = self.read_surfaces(assets, frame, size(&image), depth.is_some(), &mut remarks)?;
+        Ok(Some(PlatePictures { image, alpha, depth, surfaces, remarks }))
     }
 
     /// Reads the depth of `image`, from its own file or from the image's.
@@ -200,7 +145,7 @@ impl PlateParameters {
                 let read = assets.depth(&path.0, frame, self.depth_layer.as_deref());
                 let map = read.map_err(|error| build_error("depth", error))?;
                 let depth_size = [map.values.width(), map.values.height()];
-                check_shape(&path.0, depth_size, size(image))?;
+                check_shape("depth", &path.0, depth_size, size(image))?;
                 remarks.extend(file_remarks("depth", &map.remarks));
                 (DepthSource::Map(map), depth_size)
             }
@@ -242,40 +187,9 @@ fn image_key(error: &AssetError) -> &'static str {
     }
 }
 
-fn check_shape(path: &str, [width, height]: [usize; 2], image: [usize; 2]) -> Result<(), BuildError> {
-    if same_shape([width, height], image) {
-        return Ok(());
-    }
-    let turned =
-        if [height, width] == image { " (the image is rotated by its Exif orientation, or the depth is)" } else { "" };
-    let [image_width, image_height] = image;
-    Err(conflict(
-        "depth",
-        format!(
-            "{path}: has {width} x {height} pixels; allowed: {image_width} x {image_height}, the size of the image, or the \
-             same aspect ratio{turned}"
-        ),
-    ))
-}
-
 impl PlatePictures {
     /// What users should know about its pictures.
     pub fn remarks(&self) -> &[PlateRemark] {
         &self.remarks
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shapes_are_the_same_up_to_whole_pixels() {
-        for (depth, image) in [([518, 388], [4000, 3000]), ([384, 256], [3000, 2000]), ([2, 1], [3, 1])] {
-            assert!(same_shape(depth, image), "{depth:?} {image:?}");
-        }
-        for (depth, image) in [([3000, 4000], [4000, 3000]), ([518, 518], [4000, 3000]), ([640, 480], [1920, 1080])] {
-            assert!(!same_shape(depth, image), "{depth:?} {image:?}");
-        }
     }
 }

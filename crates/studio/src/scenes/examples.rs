@@ -6,10 +6,10 @@ use bansho::{
     Assets, MemoryAssets,
     base::{
         geometry::{mesh::Mesh, strokes::Drawing},
-        host::assets::{AssetError, AssetProblem, DepthMap, Picture, PictureLayers},
+        host::assets::{AssetError, AssetProblem, DepthMap, NormalMap, Picture, PictureLayers},
     },
     media::{
-        assets::{decode_depth, decode_picture},
+        assets::{decode_depth, decode_normals, decode_picture},
         gltf::decode_mesh,
         limits::MemoryLimit,
         svg::decode_drawing,
@@ -76,6 +76,10 @@ impl Assets for OverlayAssets {
         self.source(path).depth(path, frame, layer)
     }
 
+    fn normals(&self, path: &str, frame: i64) -> Result<Arc<NormalMap>, AssetError> {
+        self.source(path).normals(path, frame)
+    }
+
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
         self.source(path).mesh(path)
     }
@@ -114,6 +118,11 @@ impl Assets for BundledAssets {
     fn depth(&self, path: &str, _frame: i64, layer: Option<&str>) -> Result<Arc<DepthMap>, AssetError> {
         let depth = decode_depth(self.require(path)?, extension(path), layer, MemoryLimit::default());
         depth.map(Arc::new).map_err(|problem| error(path, problem))
+    }
+
+    fn normals(&self, path: &str, _frame: i64) -> Result<Arc<NormalMap>, AssetError> {
+        let normals = decode_normals(self.require(path)?, extension(path), MemoryLimit::default());
+        normals.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {

@@ -7,7 +7,7 @@ use bansho_base::{
     parameters::ProblemKind,
     phenomenon::SharedMemory,
 };
-use bansho_render::{CompiledScene, Plan, display::BitDepth, moment_bytes_per_thread, source_window};
+use bansho_render::{CompiledScene, Plan, display::BitDepth, lit_plate_bytes, moment_bytes_per_thread, source_window};
 
 use crate::job::{
     FramesInFlight,
@@ -21,6 +21,10 @@ const FRAME_BYTES: f64 = 16.0;
 const DEPTH_BYTES: f64 = 4.0;
 /// Bytes of a pixel of the file of a plate: color and alpha in single precision. Files are kept for the following frames.
 const PLATE_FILE_BYTES: f64 = 16.0;
+/// Bytes of a pixel of the files of albedo and normals of a plate.
+const SURFACE_FILE_BYTES: f64 = 16.0 + 12.0;
+/// Bytes of a pixel of a mirrored plate for the position on the plate that it shows, which is kept where the plate is lit.
+const MIRRORED_POSITION_BYTES: f64 = 16.0;
 /// Side of the pixels in which a plate is reflected by a mirror that shows no picture, in pixels of the picture.
 const BLURRED_PLATE_PIXEL: usize = 2;
 /// Bytes of the frames whose pixels are in memory at once, unless a single frame is larger.
@@ -148,7 +152,10 @@ impl BytesPerPixel {
         };
         let plate_depth = if plan.scene().plate.depth.is_some() { DEPTH_BYTES } else { 0.0 };
         let plate = if has_plate { FRAME_BYTES + plate_depth } else { 0.0 };
-        Self { drawn, whole: plate + reflected(compiled, plan, plate) }
+        // Each of the frames that are drawn at once lights a plate of its own.
+        let at_once = frames_drawn_at_once(compiled, plan, request) as f64;
+        let lit = at_once * lit_plate_bytes(compiled, plan);
+        Self { drawn, whole: plate + lit + reflected(compiled, plan, plate) }
     }
 
     fn total(&self, drawn_pixels: f64, whole_pixels: f64) -> f64 {
@@ -163,6 +170,7 @@ fn reflected(compiled: &CompiledScene, plan: &Plan, plate: f64) -> f64 {
     let view = plan.view(plan.frames().start);
     // Rain is a closed form: starting a run of it computes nothing.
     let mut closed_forms = compiled.phenomena().filter(|phenomenon| phenomenon.info().stepping.is_none());
+    let plate = if plan.scene().lights_plate() { plate + MIRRORED_POSITION_BYTES } else { plate };
     let is_raining = closed_forms.any(|phenomenon| phenomenon.clone().start().publish(view.shutter).extinction > 0.0);
     match mirror.roughness.pixel_size(view.camera.focal_pixels, is_raining) {
         Some(side) => (FRAME_BYTES + plate) / (side * side) as f64,
@@ -202,9 +210,14 @@ fn phenomena_bytes(compiled: &CompiledScene, plan: &Plan, drawn: f64) -> f64 {
     own + shared.values().sum::<f64>()
 }
 
-/// Memory of the file of a plate, bytes, which does not depend on the size of the picture.
+/// Memory of the files of a plate, bytes, which does not depend on the size of the picture.
 fn plate_file_bytes(compiled: &CompiledScene) -> f64 {
-    compiled.plate_image().map_or(0.0, |picture| PLATE_FILE_BYTES * picture.color.pixels().len() as f64)
+    let bytes = plate_file_bytes_per_pixel(compiled);
+    compiled.plate_image().map_or(0.0, |picture| bytes * picture.color.pixels().len() as f64)
+}
+
+fn plate_file_bytes_per_pixel(compiled: &CompiledScene) -> f64 {
+    PLATE_FILE_BYTES + if compiled.scene().lights_plate() { SURFACE_FILE_BYTES } else { 0.0 }
 }
 
 /// Whether a phenomenon may refract the light of what is behind it.
@@ -298,9 +311,10 @@ fn check_without_pixels(scene: &SceneFile, compiled: &CompiledScene, plan: &Plan
     }
     let plate = plate_file_bytes(compiled);
     if plate > 0.5 * fixed {
-        let megapixels = (1e-6 * plate / PLATE_FILE_BYTES).ceil() as i64;
+        let bytes_per_pixel = plate_file_bytes_per_pixel(compiled);
+        let megapixels = (1e-6 * plate / bytes_per_pixel).ceil() as i64;
         let max = memory::largest_fitting_count(megapixels, |megapixels| {
-            memory::can_allocate(fixed - plate + 1e6 * PLATE_FILE_BYTES * megapixels as f64)
+            memory::can_allocate(fixed - plate + 1e6 * bytes_per_pixel * megapixels as f64)
         });
         let file = plan.scene().plate.image.as_ref().map_or("", |image| &image.0);
         let message = format!(

@@ -1,6 +1,9 @@
 //! Whether every frame has its plate, checked before anything is drawn.
 
-use bansho_base::{host::assets::AssetError, parameters::ProblemKind};
+use bansho_base::{
+    host::assets::{AssetError, Picture},
+    parameters::ProblemKind,
+};
 use bansho_render::{CompiledScene, RenderError};
 
 use crate::job::{error::JobError, scene_file::SceneFile};
@@ -12,10 +15,9 @@ use crate::job::{error::JobError, scene_file::SceneFile};
 /// The first file that is missing, damaged or of another size, with the position of its key in the scene.
 pub(crate) fn check(scene: &SceneFile, compiled: &CompiledScene, numbers: &[i64]) -> Result<(), JobError> {
     let plate = &compiled.scene().plate;
-    for (key, path) in [("plate.image", &plate.image), ("plate.depth", &plate.depth)] {
-        let Some(path) = path.as_ref().filter(|path| path.0.contains('#')) else { continue };
+    for (key, path) in plate.files().filter(|(_, path)| path.0.contains('#')) {
         check_files(compiled, key, &path.0, numbers)
-            .map_err(|message| scene.error_at(key, ProblemKind::Conflict(message)))?;
+            .map_err(|message| scene.error_at(&format!("plate.{key}"), ProblemKind::Conflict(message)))?;
     }
     Ok(())
 }
@@ -47,12 +49,19 @@ fn plate_size(compiled: &CompiledScene, key: &str, path: &str, number: i64) -> R
         return Ok(size);
     }
     // Only decoding tells.
-    if key == "plate.image" {
-        let picture = assets.picture_layers(path, number, &plate.layers())?;
-        return Ok([picture.color.width(), picture.color.height()]);
-    }
-    let depth = assets.depth(path, number, plate.depth_layer.as_deref())?;
-    Ok([depth.values.width(), depth.values.height()])
+    let size = |picture: &Picture| [picture.color.width(), picture.color.height()];
+    Ok(match key {
+        "depth" => {
+            let depth = assets.depth(path, number, plate.depth_layer.as_deref())?;
+            [depth.values.width(), depth.values.height()]
+        }
+        "normal" => {
+            let normals = assets.normals(path, number)?;
+            [normals.values.width(), normals.values.height()]
+        }
+        "albedo" => size(&*assets.picture(path, number)?),
+        _ => size(&*assets.picture_layers(path, number, &plate.layers())?),
+    })
 }
 
 /// Checks that all frames of a plate have the size of the first: a camera takes all in one.

@@ -49,11 +49,15 @@ impl FlameSheet {
         fearless_simd::dispatch!(bansho_base::math::simd::level(), simd => row_intensities(simd, self, &state, scale))
     }
 
-    /// Parts of an exposure in each of which a flame's light hardly moves or flickers.
-    pub(crate) fn light_parts(&self, flame: &FlameInstance, shutter: Shutter) -> usize {
-        let bases = shutter.path_times().map(|t| self.base(flame, t));
-        let path = bases.windows(2).map(|pair| (pair[1] - pair[0]).length()).sum();
+    /// Parts of an exposure in each of which the light of a flame whose path has this length hardly moves or flickers.
+    pub(crate) fn light_parts(&self, flame: &FlameInstance, path: f64, shutter: Shutter) -> usize {
         shutter.light_parts(path, 0.15 * self.sheet_size(flame).x)
+    }
+
+    /// Length of the path of a flame's base during an exposure, m.
+    pub(crate) fn path(&self, flame: &FlameInstance, shutter: Shutter) -> f64 {
+        let bases = shutter.path_times().map(|t| self.base(flame, t));
+        bases.windows(2).map(|pair| (pair[1] - pair[0]).length()).sum()
     }
 
     /// Point lights that represent a flame at `t`.

@@ -91,6 +91,8 @@ const COLOR_NAMES: [&str; 11] =
     ["", "combined", "rgba", "rgb", "beauty", "c", "ci", "color", "finalimage", "primary", "main"];
 /// Last words of the names of layers or channels that are depth along the axis or distance, in lower case.
 const DEPTH_NAMES: [&str; 6] = ["depth", "z", "zdepth", "worlddepth", "scenedepthworldunits", "pz"];
+/// Last words of the names of layers that are normals, in lower case.
+const NORMAL_NAMES: [&str; 3] = ["normal", "normals", "n"];
 /// Components that a layer of depth has.
 const DEPTH_COMPONENTS: [&str; 6] = ["z", "v", "r", "y", "depth", "x"];
 
@@ -143,6 +145,12 @@ fn find_component(channels: &[NamedChannel], layer: &str, components: &[&str]) -
     let mut of_layer = channels.iter().filter(|channel| channel.layer == layer);
     let found = of_layer.find(|channel| components.iter().any(|name| channel.component.eq_ignore_ascii_case(name)));
     found.map(|channel| channel.channel)
+}
+
+/// The channels of a layer with these components; `None` if one is missing.
+fn components_of_layer(channels: &[NamedChannel], layer: &str, [a, b, c]: [&str; 3]) -> Option<[usize; 3]> {
+    let find = |component| find_component(channels, layer, &[component]);
+    Some([find(a)?, find(b)?, find(c)?])
 }
 
 /// The channels that may be depth: all of them, since a scene may choose any.
@@ -206,6 +214,30 @@ impl ChannelSelection {
             layers: layer_names(header),
         })?;
         Ok(Self { part: depth.part, color: None, depth: Some(depth) })
+    }
+
+    /// Normals: the channels X, Y and Z, else those of a layer that is called as renderers call normals, else R, G and B.
+    pub(super) fn of_normals(header: &FileHeader) -> Result<Self, AssetProblem> {
+        let mut candidates = Vec::new();
+        for part in 0..header.parts.len() {
+            let all: Vec<NamedChannel> = channels(header, part).collect();
+            for layer in all.iter().map(|channel| channel.layer.as_str()) {
+                let is_named = NORMAL_NAMES.contains(&last_word(layer).as_str());
+                let vector = components_of_layer(&all, layer, ["x", "y", "z"]);
+                let color = components_of_layer(&all, layer, ["r", "g", "b"]);
+                let rank = match (layer, is_named, vector, color) {
+                    ("", _, Some(_), _) => 0,
+                    (_, true, ..) => 1,
+                    ("", _, None, Some(_)) => 2,
+                    _ => continue,
+                };
+                candidates.extend(vector.or(color).map(|channels| (rank, part, channels)));
+            }
+        }
+        let best = candidates.into_iter().min_by_key(|(rank, ..)| *rank);
+        let (_, part, color) = best.ok_or_else(|| AssetProblem::NoChannel("X".to_owned()))?;
+        let channels = ColorChannels { model: ColorModel::Rgb, color, alpha: None };
+        Ok(Self { part, color: Some(channels), depth: None })
     }
 
     /// Whether any of its channels is in this part.
@@ -386,6 +418,31 @@ mod tests {
         assert_eq!(chosen(&header, &layers).unwrap(), expected(["AO.R", "", "Emit.G"]));
         let none = ChannelSelection::of_depth(&header, None).unwrap_err().to_string();
         assert!(none.contains("select one with `depth_layer` in [plate]"), "{none}");
+    }
+
+    #[test]
+    fn normals_are_plain_vectors_or_a_layer_of_that_name() {
+        let components = |parts: Vec<PartHeader>| {
+            let header = file(parts);
+            let selection = ChannelSelection::of_normals(&header).ok()?;
+            let color = selection.color?.components();
+            Some(
+                color.map(|channel| channel.map(|channel| header.parts[selection.part].channels[channel].name.clone())),
+            )
+        };
+        let one = |channels: &[&str]| components(vec![part(None, channels)]);
+        let expected = |names: [&str; 3]| {
+            let [x, y, z] = names.map(|name| Some(name.to_owned()));
+            Some([x, y, z, None])
+        };
+        assert_eq!(one(&["X", "Y", "Z"]), expected(["X", "Y", "Z"]));
+        assert_eq!(one(&["R", "G", "B", "A", "N.X", "N.Y", "N.Z"]), expected(["N.X", "N.Y", "N.Z"]));
+        assert_eq!(one(&["R", "G", "B", "Z"]), expected(["R", "G", "B"]));
+        assert_eq!(
+            components(vec![part(Some("Z"), &["Z"]), part(Some("Normal"), &["x", "y", "z"])]),
+            expected(["x", "y", "z"])
+        );
+        assert_eq!(one(&["Y", "Z"]), None);
     }
 
     #[test]

@@ -20,7 +20,7 @@ use ::exr::{
 };
 use bansho_base::{
     color::{MAX_EV100, ev100_of_camera},
-    host::assets::{AssetProblem, DepthMap, Picture, PictureLayers, PictureRemark},
+    host::assets::{AssetProblem, DepthMap, NormalMap, Picture, PictureLayers, PictureRemark},
     image::Image,
 };
 use rayon::prelude::*;
@@ -62,6 +62,18 @@ pub(crate) fn decode_depth(file: &[u8], layer: Option<&str>, limit: MemoryLimit)
     let values = Image::from_pixels(planes.width, planes.height, values);
     let values = values.ok_or_else(|| damaged("its values do not fill it"))?;
     Ok(DepthMap { values, remarks: pixel_aspect(&header.parts[selection.part]).into_iter().collect() })
+}
+
+/// Decodes normals as they are in the file.
+pub(crate) fn decode_normals(file: &[u8], limit: MemoryLimit) -> Result<NormalMap, AssetProblem> {
+    let header = header::parse_header(file).map_err(damaged)?;
+    check(&header, file)?;
+    let selection = ChannelSelection::of_normals(&header)?;
+    let planes = read_planes(file, &header, &selection, limit)?;
+    let values = planes.values.color.unwrap_or_default().into_iter().map(|[x, y, z, _]| [x, y, z]).collect();
+    let values = Image::from_pixels(planes.width, planes.height, values);
+    let values = values.ok_or_else(|| damaged("its values do not fill it"))?;
+    Ok(NormalMap { values, remarks: pixel_aspect(&header.parts[selection.part]).into_iter().collect() })
 }
 
 /// Reads the selected channels.

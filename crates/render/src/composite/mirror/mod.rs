@@ -3,7 +3,7 @@
 //! The plate's depth positions its pixels in the scene. The reflected ray of a pixel is marched through the plate's own picture until it
 //! meets a surface there (screen-space reflections: McGuire & Mara 2014). Where it leaves the plate, it shows the sky.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
     camera::{Camera, Lens},
@@ -26,7 +26,7 @@ mod ray_march;
 
 use super::plate::PlateFrame;
 use depth_pyramid::DepthPyramid;
-use ray_march::RayMarch;
+use ray_march::{RayMarch, Reflected};
 
 /// Side of a pixel of the backdrop, pixels of the picture.
 const BACKDROP_PIXEL: usize = 8;
@@ -42,38 +42,93 @@ pub(crate) struct Mirror {
     pub(crate) backdrop: Option<Backdrop>,
 }
 
-/// The plate as `camera` sees it in a horizontal mirror: absolute radiance with coverage, and depth as the mirrored camera measures it.
-/// Transparent where the reflected ray leaves the plate; empty without a plate. `pixel_size` is the side of the result's pixels in pixels of the plate.
-///
-/// # Errors
-/// The observer asked to stop.
-pub(crate) fn mirrored(
-    plate: &PlateFrame,
-    camera: &Camera,
-    mirror: LevelMirror,
-    exposure: f32,
-    pixel_size: usize,
-    observer: &dyn Observer,
-) -> Result<PlateFrame, Cancelled> {
-    let Some(color) = &plate.color else { return Ok(PlateFrame::default()) };
-    // Reflected rays are straight only in the pictures of perspective cameras.
-    let pyramid = plate.depth.as_ref().filter(|_| camera.lens == Lens::Perspective).map(DepthPyramid::new);
-    let march = RayMarch { color, depth: plate.depth.as_ref(), pyramid: pyramid.as_ref(), camera, mirror, exposure };
-    let [width, rows] = [color.width(), color.height()].map(|side| side.div_ceil(pixel_size));
-    let mut radiance = Image::filled(width, rows, [0.0; 4]);
-    let mut depth = Image::filled(width, rows, [f32::INFINITY]);
-    let lines = radiance.pixels_mut().par_chunks_mut(width.max(1)).zip(depth.pixels_mut().par_chunks_mut(width.max(1)));
-    lines.enumerate().try_for_each(|(y, (radiance, depth))| {
-        observer::check(observer)?;
-        for (x, (radiance, depth)) in radiance.iter_mut().zip(depth).enumerate() {
-            let pixel = (DVec2::new(x as f64, y as f64) + 0.5) * pixel_size as f64;
-            if let Some(reflected) = march.reflected(pixel) {
-                (*radiance, depth[0]) = (reflected.radiance, reflected.depth);
-            }
+/// The plate as a camera sees it in a horizontal mirror: absolute radiance with coverage, and depth as the mirrored camera measures it.
+/// Transparent where the reflected ray leaves the plate; empty without a plate.
+#[derive(Default)]
+pub(crate) struct MirroredPlate {
+    pub(crate) frame: Arc<PlateFrame>,
+    /// For each pixel the position on the plate that is reflected; not numbers where none is. Empty unless they are kept.
+    sources: Vec<DVec2>,
+}
+
+impl MirroredPlate {
+    /// `plate` as `camera` sees it. `pixel_size` is the side of the result's pixels in pixels of the plate. With `keeps_sources` the colors can be
+    /// [replaced](Self::recolor).
+    ///
+    /// # Errors
+    /// The observer asked to stop.
+    pub(crate) fn new(
+        plate: &PlateFrame,
+        camera: &Camera,
+        mirror: LevelMirror,
+        exposure: f32,
+        pixel_size: usize,
+        keeps_sources: bool,
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
+        let Some(color) = &plate.color else { return Ok(Self::default()) };
+        // Reflected rays are straight only in the pictures of perspective cameras.
+        let pyramid = plate.depth.as_ref().filter(|_| camera.lens == Lens::Perspective).map(DepthPyramid::new);
+        let plate_size = [color.width(), color.height()];
+        let march =
+            RayMarch { size: plate_size, depth: plate.depth.as_ref(), pyramid: pyramid.as_ref(), camera, mirror };
+        let [width, rows] = plate_size.map(|side| side.div_ceil(pixel_size));
+        let mut radiance = Image::filled(width, rows, [0.0; 4]);
+        let mut depth = Image::filled(width, rows, [f32::INFINITY]);
+        let mut sources = vec![DVec2::NAN; if keeps_sources { width * rows } else { 0 }];
+        let scale = 1.0 / exposure;
+        if scale.is_finite() {
+            let length = width.max(1);
+            // Without sources each row has none.
+            let rows_of_sources: Vec<&mut [DVec2]> = if keeps_sources {
+                sources.chunks_mut(length).collect()
+            } else {
+                (0..rows).map(|_| Default::default()).collect()
+            };
+            let lines = radiance.pixels_mut().par_chunks_mut(length).zip(depth.pixels_mut().par_chunks_mut(length));
+            lines.zip(rows_of_sources).enumerate().try_for_each(|(y, ((radiance, depth), sources))| {
+                observer::check(observer)?;
+                for (x, (radiance, depth)) in radiance.iter_mut().zip(depth).enumerate() {
+                    let pixel = (DVec2::new(x as f64, y as f64) + 0.5) * pixel_size as f64;
+                    if let Some(Reflected { source, depth: reflected_depth }) = march.reflected(pixel) {
+                        (*radiance, depth[0]) = (radiance_at(color, source, scale), reflected_depth);
+                        if let Some(kept) = sources.get_mut(x) {
+                            *kept = source;
+                        }
+                    }
+                }
+                Ok(())
+            })?;
         }
-        Ok(())
-    })?;
-    Ok(PlateFrame { color: Some(radiance), is_transparent: false, depth: plate.depth.is_some().then_some(depth) })
+        let depth = plate.depth.is_some().then_some(depth);
+        Ok(Self { frame: Arc::new(PlateFrame { color: Some(radiance), depth, ..PlateFrame::default() }), sources })
+    }
+
+    /// Whether its colors can be replaced.
+    pub(crate) fn keeps_sources(&self) -> bool {
+        !self.sources.is_empty()
+    }
+
+    /// Replaces the colors by those of `plate`, which differs in its colors alone from the one that it was made of.
+    pub(crate) fn recolor(&mut self, plate: &PlateFrame, exposure: f32) {
+        let Some(color) = &plate.color else { return };
+        let Some(radiance) = &mut Arc::make_mut(&mut self.frame).color else { return };
+        let (width, scale) = (radiance.width().max(1), 1.0 / exposure);
+        let rows = radiance.pixels_mut().par_chunks_mut(width).zip(self.sources.par_chunks(width));
+        rows.for_each(|(radiance, sources)| {
+            for (pixel, source) in radiance.iter_mut().zip(sources) {
+                if !source.is_nan() {
+                    *pixel = radiance_at(color, *source, scale);
+                }
+            }
+        });
+    }
+}
+
+/// Radiance and coverage at a position on a plate; `scale` is the inverse of the exposure.
+fn radiance_at(color: &Image<4>, position: DVec2, scale: f32) -> [f32; 4] {
+    let [red, green, blue, coverage] = color.sample_bilinear(position);
+    [scale * red, scale * green, scale * blue, coverage]
 }
 
 /// Composites the sky behind `image`, as the camera of a mirrored `view` sees it. `scale` is the side of a pixel of `image` in pixels of the
@@ -166,6 +221,11 @@ mod tests {
     const WALL_TOP: f64 = 3.0;
     const PILLAR: f64 = -1.0;
 
+    fn mirrored(plate: &PlateFrame, camera: &Camera, mirror: LevelMirror, pixel_size: usize) -> PlateFrame {
+        let mirrored = MirroredPlate::new(plate, camera, mirror, EXPOSURE, pixel_size, false, &Unobserved).unwrap();
+        Arc::unwrap_or_clone(mirrored.frame)
+    }
+
     fn view(roll: f64, vertical_fov_deg: f64) -> View {
         let camera = CameraParameters {
             position: [0.0, 1.6, 4.0].into(),
@@ -203,7 +263,7 @@ mod tests {
                 }
             }
         }
-        PlateFrame { color: Some(color), is_transparent: false, depth: Some(depth) }
+        PlateFrame { color: Some(color), depth: Some(depth), ..PlateFrame::default() }
     }
 
     #[test]
@@ -214,7 +274,7 @@ mod tests {
         {
             let view = view(roll, vertical_fov_deg);
             let camera = &view.camera;
-            let seen = mirrored(&plate(&view), camera, WET, EXPOSURE, 1, &Unobserved).unwrap();
+            let seen = mirrored(&plate(&view), camera, WET, 1);
             let (color, depth) = (seen.color.unwrap(), seen.depth.unwrap());
             let behind = camera.mirrored(0.0);
             let (mut right, mut wrong) = (0, 0);
@@ -263,10 +323,9 @@ mod tests {
         for (roll, vertical_fov_deg) in [(0.0, 32.0), (4.0, 60.0), (90.0, 60.0), (-130.0, 90.0), (180.0, 20.0)] {
             let view = view(roll, vertical_fov_deg);
             for plate in [plate(&view), blocks(&view)] {
-                let (color, depth) = (plate.color.as_ref().unwrap(), plate.depth.as_ref());
+                let depth = plate.depth.as_ref();
                 let pyramid = DepthPyramid::new(depth.unwrap());
-                let march =
-                    |pyramid| RayMarch { color, depth, pyramid, camera: &view.camera, mirror: WET, exposure: EXPOSURE };
+                let march = |pyramid| RayMarch { size: SIZE, depth, pyramid, camera: &view.camera, mirror: WET };
                 let (every_sample, tiles) = (march(None), march(Some(&pyramid)));
                 let mut reflections = 0;
                 for index in 0..SIZE[0] * SIZE[1] {
@@ -282,10 +341,25 @@ mod tests {
     }
 
     #[test]
+    fn replaced_colors_are_those_of_a_new_reflection() {
+        let view = view(0.0, 60.0);
+        let (plain, mut lit) = (plate(&view), plate(&view));
+        for (index, pixel) in lit.color.as_mut().unwrap().pixels_mut().iter_mut().enumerate() {
+            pixel[1] += 0.001 * index as f32;
+        }
+        let new =
+            |plate: &PlateFrame| MirroredPlate::new(plate, &view.camera, WET, EXPOSURE, 2, true, &Unobserved).unwrap();
+        let (mut mirrored, expected) = (new(&plain), new(&lit));
+        assert!(mirrored.frame.color != expected.frame.color);
+        mirrored.recolor(&lit, EXPOSURE);
+        assert!(mirrored.frame.color == expected.frame.color && mirrored.frame.depth == expected.frame.depth);
+    }
+
+    #[test]
     fn the_sky_is_mirrored_above_the_wall_and_where_the_plate_ends() {
         let view = view(0.0, 60.0);
         let plate = plate(&view);
-        let mirrored = mirrored(&plate, &view.camera, WET, EXPOSURE, 1, &Unobserved).unwrap();
+        let mirrored = mirrored(&plate, &view.camera, WET, 1);
         let mut seen = mirrored.color.clone().unwrap();
         let sky = Sky::new(SkyKind::Uniform, 300.0, 7000.0);
         composite_sky(&mut seen, &view.mirrored(0.0), &sky, 1, 0);
@@ -305,7 +379,7 @@ mod tests {
             matches!(met(camera.position, direction), Some((_, false)))
         };
         let foot = (0..SIZE[1]).find(is_ground).unwrap();
-        let seen = mirrored(plate, camera, mirror, EXPOSURE, 1, &Unobserved).unwrap().color.unwrap();
+        let seen = mirrored(plate, camera, mirror, 1).color.unwrap();
         (foot..foot + rows).map(|row| f64::from(seen.at(column as usize, row)[2])).collect()
     }
 
@@ -337,7 +411,7 @@ mod tests {
         }
         let seen = |plate_tolerance: f64| {
             let wet = LevelMirror { plate_tolerance, ..WET };
-            f64::from(mirrored(&plate, camera, wet, EXPOSURE, 1, &Unobserved).unwrap().color.unwrap().at(x, y)[2])
+            f64::from(mirrored(&plate, camera, wet, 1).color.unwrap().at(x, y)[2])
         };
         assert!((seen(0.1) - WALL).abs() < 0.2, "{} m south is not the wall", seen(0.1));
         assert!(seen(0.02) > WALL + 1.0, "{} m south is the wall", seen(0.02));
@@ -347,11 +421,8 @@ mod tests {
     fn a_mirror_in_larger_pixels_shows_the_centers_of_those() {
         let view = view(0.0, 60.0);
         let plate = plate(&view);
-        let coarse = mirrored(&plate, &view.camera, WET, EXPOSURE, 2, &Unobserved).unwrap();
-        let (fine, coarse) = (
-            mirrored(&plate, &view.camera, WET, EXPOSURE, 1, &Unobserved).unwrap().color.unwrap(),
-            coarse.color.unwrap(),
-        );
+        let coarse = mirrored(&plate, &view.camera, WET, 2);
+        let (fine, coarse) = (mirrored(&plate, &view.camera, WET, 1).color.unwrap(), coarse.color.unwrap());
         assert_eq!([coarse.width(), coarse.height()], [SIZE[0] / 2, SIZE[1] / 2]);
         let differs = |&(x, y): &(usize, usize)| {
             let mean = [0, 1, 2].map(|c| {
@@ -384,7 +455,7 @@ mod tests {
 
     #[test]
     fn without_a_plate_nothing_is_mirrored() {
-        let seen = mirrored(&PlateFrame::default(), &view(0.0, 60.0).camera, WET, EXPOSURE, 1, &Unobserved).unwrap();
+        let seen = mirrored(&PlateFrame::default(), &view(0.0, 60.0).camera, WET, 1);
         assert!(seen.color.is_none() && seen.depth.is_none());
     }
 }

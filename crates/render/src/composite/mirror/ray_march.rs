@@ -23,13 +23,13 @@ const FAR_M: f64 = 1e6;
 
 /// A plate through which reflected rays are marched.
 pub(super) struct RayMarch<'a> {
-    pub(super) color: &'a Image<4>,
+    /// Width and height of the plate, pixels.
+    pub(super) size: [usize; 2],
     pub(super) depth: Option<&'a Image<1>>,
     /// The pyramid of the depth; without it no tiles are skipped.
     pub(super) pyramid: Option<&'a DepthPyramid>,
     pub(super) camera: &'a Camera,
     pub(super) mirror: LevelMirror,
-    pub(super) exposure: f32,
 }
 
 /// A reflected ray. Its parameter t goes from 0 at the mirror to 1 at infinity, and is linear in the picture of a perspective camera.
@@ -48,11 +48,11 @@ struct Hit {
     distance: f64,
 }
 
-/// The reflection at one pixel.
+/// What is reflected at one pixel.
 #[derive(Debug)]
 pub(super) struct Reflected {
-    /// Radiance and coverage.
-    pub(super) radiance: [f32; 4],
+    /// The position on the plate that is seen.
+    pub(super) source: DVec2,
     /// Depth as the mirrored camera measures it, m.
     pub(super) depth: f32,
 }
@@ -91,15 +91,13 @@ impl RayMarch<'_> {
         let plate_depth = self.plate_depth(pixel);
         if to_mirror > FAR_M || (plate_depth < to_mirror && self.is_above_mirror(pixel, plate_depth)) {
             // An object in front hides the mirror here. Its own color is the best guess for blurred reflections beside it.
-            return self.radiance(pixel).map(|radiance| Reflected { radiance, depth: plate_depth as f32 });
+            return Some(Reflected { source: pixel, depth: plate_depth as f32 });
         }
         let up = DVec3::new(down.x, -down.y, down.z);
         let ray = self.reflected_ray(self.camera.position + down * to_mirror, to_mirror, up);
         match self.first_hit(pixel, &ray) {
-            Some(hit) => {
-                Some(Reflected { radiance: self.radiance(hit.pixel)?, depth: (to_mirror + hit.distance) as f32 })
-            }
-            None => self.color_at_infinity(&ray).map(|radiance| Reflected { radiance, depth: f32::INFINITY }),
+            Some(hit) => Some(Reflected { source: hit.pixel, depth: (to_mirror + hit.distance) as f32 }),
+            None => self.source_at_infinity(&ray).map(|source| Reflected { source, depth: f32::INFINITY }),
         }
     }
 
@@ -175,8 +173,8 @@ impl RayMarch<'_> {
     }
 
     fn is_inside(&self, pixel: DVec2) -> bool {
-        let (width, height) = (self.color.width() as f64, self.color.height() as f64);
-        pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < width && pixel.y < height
+        let [width, height] = self.size;
+        pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < width as f64 && pixel.y < height as f64
     }
 
     /// The point between two samples where ray and plate have the same depth.
@@ -189,10 +187,10 @@ impl RayMarch<'_> {
         Hit { pixel: before.pixel + (after.pixel - before.pixel) * fraction, distance: ray.distance(t) }
     }
 
-    /// The plate's color at the end of a ray that met no surface, where the plate is infinitely far.
-    fn color_at_infinity(&self, ray: &ReflectedRay) -> Option<[f32; 4]> {
+    /// The end of a ray that met no surface, where the plate is infinitely far.
+    fn source_at_infinity(&self, ray: &ReflectedRay) -> Option<DVec2> {
         let end = self.camera.project(ray.origin + ray.direction * FAR_M)?.pixel;
-        (self.is_inside(end) && !self.plate_depth(end).is_finite()).then(|| self.radiance(end))?
+        (self.is_inside(end) && !self.plate_depth(end).is_finite()).then_some(end)
     }
 
     /// Whether what the plate shows at a pixel, at this depth, is above the mirror.
@@ -207,12 +205,5 @@ impl RayMarch<'_> {
         let Some(depth) = self.depth else { return f64::INFINITY };
         let (x, y) = (pixel.x as usize, pixel.y as usize);
         f64::from(depth.at(x.min(depth.width() - 1), y.min(depth.height() - 1))[0])
-    }
-
-    /// The plate's radiance and coverage at a pixel.
-    fn radiance(&self, pixel: DVec2) -> Option<[f32; 4]> {
-        let [red, green, blue, coverage] = self.color.sample_bilinear(pixel);
-        let scale = 1.0 / self.exposure;
-        scale.is_finite().then_some([scale * red, scale * green, scale * blue, coverage])
     }
 }

@@ -1,9 +1,7 @@
-//! Shadows of visible obstacles on the ground, by sphere tracing of their signed distances.
+//! Shadows of solids, by sphere tracing of their signed distances.
 
-use bansho_base::{
-    math::{self, DVec3},
-    phenomenon::surroundings::Occluder,
-};
+use super::occluder::Occluder;
+use crate::math::{self, DVec3};
 
 /// Steps after which a ray that grazes a solid counts as shadowed.
 const MAX_STEPS: usize = 48;
@@ -14,7 +12,7 @@ const SKY_SAMPLES: [[f64; 2]; 4] = [[0.08, 0.25], [0.25, 0.25], [0.6, 0.3], [1.5
 
 /// Fraction of a light that reaches `point`: it is in direction `toward` (unit vector) at `distance` (m), and has the angular radius `size`. Half shadows
 /// follow from how nearly the ray misses a solid.
-pub(crate) fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f64, size: f64) -> f64 {
+pub fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f64, size: f64) -> f64 {
     // Within the lamp nothing is between.
     if distance <= 0.0 {
         return 1.0;
@@ -54,7 +52,7 @@ fn misses_bounds(caster: &Occluder, point: DVec3, toward: DVec3, distance: f64, 
 }
 
 /// Fraction of the sky's light that reaches level ground at `point`: the nearer solids are above it, the less (ambient occlusion).
-pub(crate) fn sky_visibility(casters: &[Occluder], point: DVec3) -> f64 {
+pub fn sky_visibility(casters: &[Occluder], point: DVec3) -> f64 {
     let mut visible = 1.0;
     for caster in casters {
         if let Some((center, radius)) = caster.bounding_sphere() {
