@@ -40,13 +40,6 @@ pub(super) struct SurfaceInputs<'a> {
     pub(super) surfaces: &'a PlateSurfaces,
 }
 
-/// One pixel of a surface.
-struct SurfacePixel {
-    reflectance: [f32; 3],
-    normal: [f32; 3],
-    depth: f32,
-}
-
 /// A row of the planes of a surface.
 struct SurfaceRow<'a> {
     reflectance: [&'a mut [f32]; 3],
@@ -133,33 +126,26 @@ impl<'a> SurfaceMaps<'a> {
 
     fn fill_row(&self, y: usize, row: SurfaceRow) {
         let albedo_taps = self.albedo.rows(y);
-        let [normal_taps, depth_taps] =
-            [&self.normals, &self.depth_normals].map(|map| map.as_ref().map(|map| (map, map.rows(y))));
-        let normal_at = |x: usize| {
-            let (map, taps) = normal_taps.as_ref()?;
-            let [right, up, back] = unit(map.at(x, taps))?.map(f64::from);
-            Some((self.camera.world_from_camera * DVec3::new(right, up, back)).as_vec3().to_array())
-        };
-        let depth_normal_at = |x: usize| {
-            let (map, taps) = depth_taps.as_ref()?;
-            unit(map.at(x, taps))
-        };
+        let normals = self.normals.as_ref().map(|map| (map, map.rows(y)));
+        let depth_normals = self.depth_normals.as_ref().map(|map| (map, map.rows(y)));
         for x in 0..self.color.width() {
             let ([.., coverage], [depth]) = (self.color.at(x, y), self.depth.at(x, y));
             let direction = self.camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
             let Some(direction) = direction.filter(|_| coverage > 0.0 && depth > 0.0 && depth < f32::INFINITY) else {
                 continue;
             };
-            let facing = || (-direction.normalize()).as_vec3().to_array();
-            let pixel = SurfacePixel {
-                reflectance: self.albedo.at(x, &albedo_taps).map(|albedo| albedo * coverage / PI),
-                normal: normal_at(x).or_else(|| depth_normal_at(x)).unwrap_or_else(facing),
-                depth,
-            };
-            for c in 0..3 {
-                (row.reflectance[c][x], row.normal[c][x]) = (pixel.reflectance[c], pixel.normal[c]);
+            let mut normal = (-direction.normalize()).as_vec3().to_array();
+            if let Some(seen) = normals.as_ref().and_then(|(map, taps)| unit(map.at(x, taps))) {
+                let seen = DVec3::from(seen.map(f64::from));
+                normal = (self.camera.world_from_camera * seen).as_vec3().to_array();
+            } else if let Some(of_depth) = depth_normals.as_ref().and_then(|(map, taps)| unit(map.at(x, taps))) {
+                normal = of_depth;
             }
-            row.depth[x] = pixel.depth;
+            let albedo = self.albedo.at(x, &albedo_taps);
+            for c in 0..3 {
+                (row.reflectance[c][x], row.normal[c][x]) = (albedo[c] * coverage / PI, normal[c]);
+            }
+            row.depth[x] = depth;
         }
     }
 }

@@ -79,12 +79,9 @@ impl MirroredPlate {
         let scale = 1.0 / exposure;
         if scale.is_finite() {
             let length = width.max(1);
-            // Without sources each row has none.
-            let rows_of_sources: Vec<&mut [DVec2]> = if keeps_sources {
-                sources.chunks_mut(length).collect()
-            } else {
-                (0..rows).map(|_| Default::default()).collect()
-            };
+            let mut rows_of_sources: Vec<&mut [DVec2]> = sources.chunks_mut(length).collect();
+            // Where none are kept, no row has any.
+            rows_of_sources.resize_with(rows, Default::default);
             let lines = radiance.pixels_mut().par_chunks_mut(length).zip(depth.pixels_mut().par_chunks_mut(length));
             lines.zip(rows_of_sources).enumerate().try_for_each(|(y, ((radiance, depth), sources))| {
                 observer::check(observer)?;
