@@ -16,7 +16,7 @@ use bansho_base::{
     },
 };
 use bansho_media::{
-    assets::{decode_depth, decode_picture},
+    assets::{decode_depth, decode_normals, decode_picture},
     limits,
 };
 use bansho_render::{
@@ -127,6 +127,11 @@ pub fn read_plate(bytes: &[u8], extension: &str) {
         if let Ok(picture) = decode_picture(bytes, extension, &PictureLayers::default(), limits::MemoryLimit::default())
         {
             check_plate(picture);
+        }
+        // The same bytes as normals, which only an EXR has.
+        if let Ok(map) = decode_normals(bytes, extension, limits::MemoryLimit::default()) {
+            let (width, height) = (map.values.width(), map.values.height());
+            assert!(width > 0 && height > 0 && width.max(height) as u64 <= limits::SIDE, "{width} x {height}");
         }
     });
 }
