@@ -97,6 +97,28 @@ fn an_obstacle_and_a_light_move_by_their_keys() {
 }
 
 #[test]
+fn rain_beside_an_obstacle_is_as_it_is_without_it() {
+    // Dark ground, so that far rain is seen before it, and few drops that are drawn one by one.
+    let rain = |method: &str| {
+        format!(
+            "[sky]\nluminance = 3\n[ground]\ncolor = [0.01, 0.01, 0.01]\ntexture = 0\n[[rain]]\nrate_mm_per_h = 20\nmethod = \"{method}\"\n\
+             distance = 1\nopacity_gain = 0\nsplashes = {{ fraction = 0 }}\n"
+        )
+    };
+    for method in ["drops", "billboards", "textures"] {
+        let alone = frame(&rain(method), 0);
+        let beside = frame(&format!("{}{BOX}", rain(method)), 0);
+        // The box covers columns 32 to 63. Beside it, pixels are in the same block; farther away, the ground is not in its shadow.
+        let blocks = [26, 29, 66, 69].into_iter().flat_map(|x| (0..31).map(move |y| (x, y)));
+        let ground = [2, 10, 85, 93].into_iter().flat_map(|x| (33..40).map(move |y| (x, y)));
+        for (x, y) in blocks.chain(ground) {
+            let [alone, beside] = [&alone, &beside].map(|frame| frame.beauty.at(x, y)[1]);
+            assert!(alone > 0.0 && (alone - beside).abs() <= 0.02 * alone, "{method} at {x}, {y}: {alone} {beside}");
+        }
+    }
+}
+
+#[test]
 fn what_is_wrong_with_an_obstacle_or_a_light_is_one_located_error() {
     for (table, told) in [
         ("[[obstacle]]\nshape = \"cone\"\n", "obstacle.0.shape"),

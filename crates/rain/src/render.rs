@@ -104,12 +104,13 @@ impl<'a> PreparedRain<'a> {
             streaks.drops += textured.drop_count() as f64;
         }
         let end = if rain.parameters.airlight_distance > 0.0 { rain.near_reach() } else { 0.0 };
-        let farthest = rain.reach(surroundings);
         let unlit = DropLighting { lights: &[], ..lighting };
-        // The paper only dims what is far away.
-        let (lighting, sky_lighting) = match rain.parameters.method {
-            Method::Textures => (&unlit, light_caches.skies.for_view(&rain.optics.phase_function, view, Sky::DARK)),
-            Method::Billboards | Method::Drops => (&lighting, sky_lighting.clone()),
+        // The paper only dims what is far away: dark rain up to the horizon would hide the sky.
+        let (lighting, sky_lighting, farthest) = match rain.parameters.method {
+            Method::Textures => {
+                (&unlit, light_caches.skies.for_view(&rain.optics.phase_function, view, Sky::DARK), end)
+            }
+            Method::Billboards | Method::Drops => (&lighting, sky_lighting.clone(), rain.reach(surroundings)),
         };
         let single_scattering = SingleScattering::new(
             &shutter_state,

@@ -264,6 +264,7 @@ impl Plan {
         let mut view = View::new(self.camera.clone(), shutter, next, self.size, overscan);
         view.white_luminance = Some(color::white_luminance(f64::from(self.exposure_ev100)));
         view.aovs_requested = self.aovs;
+        view.has_plate = self.scene.has_plate();
         view.glare_is_added = self.glare > 0.0;
         let view = view.with_window(self.window);
         match self.loop_s() {

@@ -131,6 +131,8 @@ pub struct View {
     pub mirror: Option<f64>,
     /// Luminance of display white, cd/m^2, if known: light far below it need not be drawn.
     pub white_luminance: Option<f64>,
+    /// Whether the scene has a plate. Strips have depths that hide also where visible solids are.
+    pub has_plate: bool,
     /// Whether the glare of the lens is added to the picture as a whole, so that phenomena add none of their own.
     pub glare_is_added: bool,
     /// Whether AOVs are requested; strips then have planes for them.
@@ -167,6 +169,7 @@ impl View {
             window: Rect::from_size(size[0], size[1]),
             mirror: None,
             white_luminance: None,
+            has_plate: false,
             glare_is_added: false,
             aovs_requested: false,
             export_origin,

@@ -119,10 +119,10 @@ impl<'a> SingleScattering<'a> {
         &self.sky.fine.tiles
     }
 
-    /// The bounds of the medium, with or without a plate.
-    fn bounds(&self, has_plate: bool) -> MediumBounds<'_> {
+    /// The bounds of the medium: a plate shows its own far rain.
+    fn bounds(&self) -> MediumBounds<'_> {
         let camera = &self.view.camera;
-        let end = if has_plate { self.end } else { self.farthest };
+        let end = if self.view.has_plate { self.end } else { self.farthest };
         MediumBounds { camera, height: (camera.position.y - self.ground) as f32, end }
     }
 
@@ -163,7 +163,7 @@ impl<'a> SingleScattering<'a> {
             if rect.is_empty() {
                 continue;
             }
-            let bounds = self.bounds(has_plate);
+            let bounds = self.bounds();
             let corrector = HaloCorrector { halo, bounds, table: &self.table, lit_end: self.end, slice };
             for y in rect.y..rect.bottom() {
                 let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
@@ -258,7 +258,7 @@ impl<'a> SingleScattering<'a> {
                 (sky.once[c][i], sky.endless[c][i]) = (once[c], endless[c]);
             }
         }
-        let ranges = self.bounds(false).ranges(&mut directions, slice, &[f32::INFINITY; LANES]);
+        let ranges = self.bounds().ranges(&mut directions, slice, &[f32::INFINITY; LANES]);
         let segments = RaySegments::new(&self.table, &ranges, self.end);
         let (opacities, rescattered) = (segments.opacities(), segments.opacities_up_to_ends());
         let mut layer = [ZERO_LANES, ZERO_LANES, ZERO_LANES, opacities];
@@ -319,7 +319,7 @@ impl<'a> SingleScattering<'a> {
         plate: &LaneArray,
     ) -> Option<Layer> {
         let mut directions = Directions::new(&self.view.camera, column * FINE_TILE, y);
-        let ranges = self.bounds(true).ranges(&mut directions, slice, plate);
+        let ranges = self.bounds().ranges(&mut directions, slice, plate);
         if !any_range(&ranges) {
             return None;
         }
