@@ -9,7 +9,11 @@ use bansho::{FogParameters, KINDS, phenomena};
 use bansho_base::{
     camera::CameraParameters,
     color,
-    host::{assets::MemoryAssets, observer::Unobserved},
+    host::{
+        assets::{Encoding, MemoryAssets, Picture},
+        observer::Unobserved,
+    },
+    image::Image,
     math::random::{Key, Purpose, uniform},
     parameters::{Parameters, Reader, Table, Value, sample},
     tables,
@@ -77,9 +81,16 @@ fn assert_finite(outcomes: &[Outcome]) {
     assert!(failed.is_empty(), "{}", failed.join("\n\n"));
 }
 
+/// Name of the picture that flame sheets may have as texture.
+const TEXTURE: &str = "texture.png";
+
 /// Draws a frame of a scene that is valid; `false` for one whose parameters do not go together.
 fn draw(text: &str) -> bool {
-    let assets = Arc::new(MemoryAssets::default());
+    let mut assets = MemoryAssets::default();
+    let texels = (0..35).map(|index| [0.3 + 0.02 * index as f32, 0.5, 0.4, 1.0]).collect();
+    let texture = Image::from_pixels(5, 7, texels).expect("5 x 7 pixels");
+    assets.insert_picture(TEXTURE, Picture::opaque(texture, Encoding::DisplaySrgb));
+    let assets = Arc::new(assets);
     let Ok(mut scene) = Scene::parse("random.toml", text, KINDS) else { return false };
     scene.picture.overscan = scene.picture.overscan.min(2);
     let number = scene.picture.first_frame + 1;
@@ -163,6 +174,16 @@ fn keep_compatible(table: &mut Table, kind: &str) {
         // The thesis's color table has no other lines than those of its hard spheres.
         let has_five_lines = is(rendering, "energy_deposition", "hard_sphere");
         rendering.entries.retain(|entry| has_five_lines || entry.key != "color_matching");
+        // Nor are single photons drawn by other rules.
+        let has_photons = is(rendering, "sampling", "single_photons");
+        rendering.entries.retain(|entry| has_five_lines || !has_photons || entry.key != "sampling");
+    }
+    let texture = table.entries.iter_mut().find(|entry| entry.key == "texture").map(|entry| &mut entry.node.value);
+    if let (true, Some(Value::Table(texture))) = (kind == "flame_sheet", texture)
+        && is(texture, "kind", "picture")
+    {
+        texture.entries.retain(|entry| entry.key != "file");
+        texture.push("file", Value::Text(TEXTURE.into()));
     }
 }
 

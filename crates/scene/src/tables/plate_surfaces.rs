@@ -113,8 +113,10 @@ fn check_range<const N: usize>(
     Err(conflict(key, format!("{path}: has the value {value} at pixel [{x}, {y}]; allowed: {min} to {max}")))
 }
 
+/// A map of half the size, or of another whole fraction of it, is made so on purpose: normals are large.
 fn remark_size(key: &'static str, map: [usize; 2], image: [usize; 2], remarks: &mut Vec<PlateRemark>) {
-    if map != image {
+    let is_whole_fraction = image[0].is_multiple_of(map[0]) && image[1].is_multiple_of(map[1]);
+    if !is_whole_fraction {
         remarks.push(PlateRemark::MapSize { key, map, image });
     }
 }
