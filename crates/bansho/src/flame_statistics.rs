@@ -280,7 +280,7 @@ mod tests {
         // Row 1 is lit in two of four frames.
         assert_eq!((film.height, film.pieces, film.base_width), (2.0 / 4.0, 1.0, 1.0));
         let dark = mask(&["...", "...", "...", "..."]);
-        assert_eq!(FlameStatistics::new(&[dark.clone()]), None);
+        assert_eq!(FlameStatistics::new(std::slice::from_ref(&dark)), None);
         let flickering = FlameStatistics::new(&[low, dark]).unwrap();
         assert_eq!((flickering.base_width, flickering.area), (1.0, 4.0 / 24.0));
     }

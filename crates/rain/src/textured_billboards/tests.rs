@@ -1,7 +1,7 @@
 //! The paper's textures and billboards.
 
 use bansho_base::{
-    math::DVec3,
+    math::{self, DVec3},
     phenomenon::{strip::View, surroundings::Surroundings},
 };
 
@@ -45,7 +45,7 @@ fn textures_hold_the_drops_of_a_bin_or_of_the_printed_density() {
         let set = TextureSet::new(&RainParameters { texture_drop_count, ..paper(rate) }, 1).unwrap();
         set.of_rate(rate).iter().map(super::StreakTexture::drop_count).collect()
     };
-    let printed = |rate: f64, diameter: f64| 8000.0 * (-4.1 * rate.powf(-0.21) * diameter).exp();
+    let printed = |rate: f64, diameter: f64| 8000.0 * math::exp(-4.1 * math::pow(rate, -0.21) * diameter);
     for rate in [1.0, 5.0, 10.0, 20.0] {
         for (count, diameter) in counts(DropCountLaw::Density, rate).iter().zip([1.0, 1.2, 1.4, 1.6, 1.8, 2.0]) {
             assert!((*count as f64 - printed(rate, diameter)).abs() <= 1.0, "{rate} {diameter}: {count}");

@@ -13,8 +13,9 @@ pub(crate) fn picture_texels(picture: &Picture) -> Vec<f32> {
     let (width, height) = (picture.color.width(), picture.color.height());
     let gray_level = |[r, g, b, a]: [f32; 4]| {
         let level = r * GRAY_WEIGHTS[0] + g * GRAY_WEIGHTS[1] + b * GRAY_WEIGHTS[2];
-        // `max` takes 0 for NaN.
-        picture.alpha.premultiplied([level, 0.0, 0.0, a])[0].max(0.0).min(1.0)
+        let level = picture.alpha.premultiplied([level, 0.0, 0.0, a])[0];
+        // NaN is not above 0.
+        if level > 0.0 { level.min(1.0) } else { 0.0 }
     };
     let levels: Vec<f32> = picture.color.pixels().iter().map(|pixel| gray_level(*pixel)).collect();
     let columns = resampling_taps(width, COLUMNS);

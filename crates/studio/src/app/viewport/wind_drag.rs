@@ -20,8 +20,8 @@ pub(super) struct WindDrag {
     recording: bool,
     /// When it began, s.
     start_s: f64,
-    /// Decimal places of the wind, so that files stay readable.
-    decimal_places: i32,
+    /// Steps in a unit of the wind, to which it is rounded, so that files stay readable.
+    steps_per_unit: f64,
 }
 
 /// The label of the undo step.
@@ -41,7 +41,7 @@ impl WindDrag {
             base_velocity,
             recording: session.recording,
             start_s: session.transport.time_s(),
-            decimal_places: decimal_places(wind_scale(session)),
+            steps_per_unit: steps_per_unit(wind_scale(session)),
         };
         session.document.end_step();
         if wind_drag.recording {
@@ -53,8 +53,8 @@ impl WindDrag {
 
     /// Sets the wind to `wind`, in the unit of the scene's wind, on top of the wind before the drag.
     pub(super) fn update(&self, session: &mut Session, wind: DVec3) {
-        let steps = f64::powi(10.0, self.decimal_places);
-        let velocity = (DVec3::from(self.base_velocity) + wind).to_array().map(|speed| (speed * steps).round() / steps);
+        let round = |speed: f64| (speed * self.steps_per_unit).round() / self.steps_per_unit;
+        let velocity = (DVec3::from(self.base_velocity) + wind).to_array().map(round);
         if self.recording {
             // The keyframe at the start of the drag stays, and recording stops at the end of the shot.
             if session.transport.time_s() != self.start_s && session.transport.is_playing() {
@@ -99,7 +99,8 @@ pub(in crate::app) fn wind_hint(WindScale { strong, unit }: WindScale) -> String
     )
 }
 
-/// Thousandths of 1 m/s, and at least thousandths of a strong wind.
-fn decimal_places(WindScale { strong, .. }: WindScale) -> i32 {
-    3 + (-strong.log10()).ceil().clamp(0.0, 9.0) as i32
+/// Thousandths of a unit, and at least thousandths of a strong wind: a power of ten.
+fn steps_per_unit(WindScale { strong, .. }: WindScale) -> f64 {
+    let powers = std::iter::successors(Some(1e3), |steps| Some(10.0 * steps));
+    powers.take(10).find(|steps| strong * steps >= 1e3).unwrap_or(1e12)
 }
