@@ -11,7 +11,7 @@ use bansho_environment::{
     solids::ObstacleParameters,
 };
 #[cfg(feature = "fire")]
-use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetParameters};
+use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetParameters, volume::FlameVolumeParameters};
 #[cfg(feature = "rain")]
 use bansho_rain::RainParameters;
 use bansho_scene::{Scene, SceneError, kinds};
@@ -33,6 +33,8 @@ pub const KINDS: &[TableKind] = &[
     FlameSheetParameters::KIND,
     #[cfg(feature = "fire")]
     FlameParticlesParameters::KIND,
+    #[cfg(feature = "fire")]
+    FlameVolumeParameters::KIND,
     #[cfg(feature = "rain")]
     RainParameters::KIND,
     #[cfg(feature = "aurora")]
@@ -45,8 +47,13 @@ pub fn phenomena() -> impl Iterator<Item = &'static TableKind> + Clone {
 }
 
 /// All kinds of phenomena of Bansho, also those that are disabled in this build, each with the feature of this crate that enables it.
-const FEATURES: [(&str, &str); 4] =
-    [("flame_sheet", "fire"), ("flame_particles", "fire"), ("rain", "rain"), ("aurora", "aurora")];
+const FEATURES: [(&str, &str); 5] = [
+    ("flame_sheet", "fire"),
+    ("flame_particles", "fire"),
+    ("flame_volume", "fire"),
+    ("rain", "rain"),
+    ("aurora", "aurora"),
+];
 
 /// Parses and checks a scene with the tables of this build; `file` is its name in messages. [`CompiledScene::build`] then reads the
 /// files that it names and builds its phenomena.

@@ -50,7 +50,7 @@
 //!
 //! | looked for | found in |
 //! | --- | --- |
-//! | parameters of a phenomenon | [`FlameSheetParameters`], [`FlameParticlesParameters`], [`RainParameters`], [`AuroraParameters`]; their tables in [`fire`], [`rain`], [`aurora`] |
+//! | parameters of a phenomenon | [`FlameSheetParameters`], [`FlameParticlesParameters`], [`FlameVolumeParameters`], [`RainParameters`], [`AuroraParameters`]; their tables in [`fire`], [`rain`], [`aurora`] |
 //! | camera, wind, air, sky, ground, lamps, obstacles, fog | [`CameraParameters`], [`WindParameters`], [`Air`], [`SkyParameters`], [`GroundParameters`], [`LightParameters`], [`ObstacleParameters`], [`FogParameters`] |
 //! | values that change over time | [`Animated`] |
 //! | pixels, depth, AOVs | [`Picture`]; for whole frames [`write_rgba16f`] and its kin |
@@ -181,7 +181,9 @@ pub use bansho_environment::{
 };
 #[cfg(feature = "fire")]
 #[doc(inline)]
-pub use bansho_fire::{particles::FlameParticlesParameters, sheet::FlameSheetParameters};
+pub use bansho_fire::{
+    particles::FlameParticlesParameters, sheet::FlameSheetParameters, volume::FlameVolumeParameters,
+};
 #[cfg(feature = "rain")]
 #[doc(inline)]
 pub use bansho_rain::RainParameters;

@@ -196,6 +196,11 @@ fn keep_small(table: &mut Table, kind: &str) {
             table.push("particles", Value::Integer(60));
             table.push("preroll_s", Value::Number(0.2));
         }
+        "flame_volume" => {
+            drop(&["burners", "resolution", "quality", "step_s", "preroll_s", "domain_min", "domain_max"]);
+            table.push("resolution", Value::Number(11.0));
+            table.push("preroll_s", Value::Number(0.1));
+        }
         "rain" => drop(&["distance", "diameters_mm"]),
         "aurora" => {
             drop(&["particles", "preroll_s"]);

@@ -1,17 +1,20 @@
-//! Fire: a flame sheet, a particle flame, and sparks for both.
+//! Fire: a flame sheet, a particle flame, a volume flame, and sparks for all of them.
 //!
 //! | module | model | after |
 //! |---|---|---|
 //! | [`sheet`] | a small, near flame as a warped, scrolling texture in closed form; with smoke | Ohshima and Itahashi |
 //! | [`particles`] | burning gas by smoothed-particle hydrodynamics, black-body light, heat haze | Inagaki et al. |
+//! | [`volume`] | burning gas on a grid: thin sheets of soot that neck, roll and puff, seen from any side | Burke and Schumann; Nguyen, Fedkiw and Jensen; and others |
 //! | [`sparks`] | glowing particles in closed form, drawn as streaks | |
 //!
-//! The two flames do not depend on each other. The sheet is a closed form, which can be evaluated at any time; the particle flame is simulated in steps. Each module's page lists
+//! The sheet is a closed form, which can be evaluated at any time; the other two are simulated in steps. The volume flame takes the surfaces of its burners from
+//! the particle flame; nothing else is shared. Each module's page lists
 //! its references and its equations with the functions that implement them.
 
 pub mod particles;
 pub mod sheet;
 pub mod sparks;
+pub mod volume;
 
 use bansho_base::color;
 

@@ -68,6 +68,20 @@ impl Occluder {
         }
     }
 
+    /// The same solid elsewhere, m.
+    #[must_use]
+    pub fn translated(&self, offset: DVec3) -> Self {
+        let mut moved = self.clone();
+        match &mut moved {
+            Self::Sphere { center, .. } | Self::Cuboid { center, .. } | Self::Cylinder { center, .. } => {
+                *center += offset;
+            }
+            Self::HalfSpace { point, .. } => *point += offset,
+            Self::Mesh { placement, .. } => placement.position += offset,
+        }
+        moved
+    }
+
     /// Distance from `point` to the surface, m; negative inside.
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         match self {

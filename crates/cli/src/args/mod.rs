@@ -90,7 +90,7 @@ pub(crate) struct NewArgs {
     /// Name of the scene; `.toml` is added if it has no extension. An existing file is not overwritten.
     #[arg(required_unless_present = "list")]
     pub(crate) name: Option<PathBuf>,
-    /// Kind of phenomenon: flame_sheet (the default), flame_particles, rain or aurora.
+    /// Kind of phenomenon: flame_sheet (the default), flame_particles, flame_volume, rain or aurora.
     #[arg(long, value_name = "KIND", conflicts_with = "from")]
     pub(crate) kind: Option<String>,
     /// Write all settings with their purpose and allowed values, not only those that are changed most often.

@@ -62,7 +62,7 @@ impl FadeOut {
 }
 
 /// Absorption coefficient of soot per volume fraction, 1/m: `4.9 / lambda` (Dalzell and Sarofim 1969) for green light.
-const VISIBLE_SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
+pub(crate) const VISIBLE_SOOT_ABSORPTION: f64 = 4.9 / 550e-9;
 
 /// Luminance per meter of freshly burning gas in the light of CH and C2, cd/m^2. The real reaction zone is about 1 mm thick and has some tens of cd/m^2;
 /// particles distribute it over centimeters.

@@ -27,7 +27,9 @@ pub(crate) mod splat;
 
 pub use aovs::AOVS;
 pub use buffer_pool::BufferPool;
+pub(crate) use deflection::refractivity;
 pub use emitted_light::{point_lights_of_exposure, point_lights_of_gas};
+pub(crate) use gas::VISIBLE_SOOT_ABSORPTION;
 pub use gas::{FadeOut, Gas, soot_absorption};
 pub use prepared::{PreparedGas, depth_intervals};
 pub use samples::{GasExposure, GasState};

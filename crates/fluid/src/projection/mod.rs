@@ -1,0 +1,317 @@
+//! The pressure that makes the divergence of the velocity what the expansion of the gas asks for.
+
+mod poisson;
+mod transform;
+
+use bansho_base::{
+    host::parallel::prelude::*,
+    math::simd::{LANES, Lanes},
+};
+use fearless_simd::{Simd, dispatch, prelude::*};
+
+use crate::{
+    grid::{GHOST_LAYERS, Grid},
+    momentum::Velocity,
+    reconstruction::load,
+    sides::{Ambient, Side, SideFace, side_pressure},
+    solids::Solids,
+};
+use poisson::PoissonSolver;
+
+/// Largest residual of the equation with solids, relative to its right side.
+const TOLERANCE: f64 = 1e-3;
+/// Most iterations with solids.
+const MAX_ITERATIONS: usize = 30;
+
+/// Solver of the pressure of a grid, with its buffers.
+pub(crate) struct Projection {
+    grid: Grid,
+    has_floor: bool,
+    solver: PoissonSolver,
+    /// Source, then solution, without ghost cells.
+    values: Vec<f32>,
+    /// For solids: residual, direction, its image under the operator, and the pressure.
+    iteration: [Vec<f32>; 4],
+}
+
+/// What a projection is told besides the velocity.
+pub(crate) struct Constraint<'a> {
+    /// Divergence that the velocity gets, 1/s.
+    pub(crate) divergence: &'a [f32],
+    pub(crate) ambient: &'a Ambient,
+    pub(crate) solids: &'a Solids,
+    /// The constant density of the pressure's equation, kg/m^3.
+    pub(crate) density: f32,
+    pub(crate) seconds: f32,
+}
+
+impl Projection {
+    pub(crate) fn new(grid: Grid, has_floor: bool) -> Self {
+        Self {
+            grid,
+            has_floor,
+            solver: PoissonSolver::new(grid, has_floor),
+            values: vec![0.0; grid.cells()],
+            iteration: std::array::from_fn(|_| Vec::new()),
+        }
+    }
+
+    /// Finds the pressure, which is written to the cells of `pressure` (Pa), and subtracts its gradient from the velocity.
+    pub(crate) fn project(&mut self, velocity: &mut Velocity, pressure: &mut [f32], constraint: &Constraint) {
+        self.set_source(velocity, constraint);
+        if constraint.solids.is_empty() {
+            self.solver.solve(&mut self.values);
+        } else {
+            self.solve_around_solids(constraint.solids, pressure);
+        }
+        self.copy_to(pressure);
+        self.subtract_gradient(velocity, pressure, constraint);
+    }
+
+    /// The right side of the equation: `rho (div u - S) / t`, and what the pressures on the open sides add.
+    fn set_source(&mut self, velocity: &Velocity, constraint: &Constraint) {
+        let grid = self.grid;
+        let plane = grid.size[0] * grid.size[2];
+        let scale = constraint.density / constraint.seconds;
+        let level = bansho_base::math::simd::level();
+        self.values.par_chunks_mut(plane).enumerate().for_each(|(y, values)| {
+            dispatch!(level, simd => divergence_layer(simd, &grid, velocity, constraint.divergence, scale, y, values));
+        });
+        let per_area = (2.0 / (grid.spacing * grid.spacing)) as f32;
+        for side in Side::open(self.has_floor) {
+            for SideFace { face, position: [x, y, z], .. } in side.faces(&grid) {
+                let pressure = pressure_on(side, velocity[side.axis][face], constraint.ambient);
+                self.values[y * plane + z * grid.size[0] + x] -= per_area * pressure;
+            }
+        }
+        if !constraint.solids.is_empty() {
+            self.values.par_chunks_mut(plane).enumerate().for_each(|(y, values)| {
+                for (z, row) in grid.rows(y) {
+                    let own = &mut values[z * grid.size[0]..][..grid.size[0]];
+                    let cells = own.iter_mut().enumerate();
+                    cells.filter(|(x, _)| constraint.solids.contains(row + x)).for_each(|(_, value)| *value = 0.0);
+                }
+            });
+        }
+    }
+
+    fn copy_to(&self, pressure: &mut [f32]) {
+        let grid = self.grid;
+        let [_, plane, _] = grid.strides();
+        pressure.par_chunks_mut(plane).enumerate().for_each(|(padded_y, values)| {
+            let Some(y) = padded_y.checked_sub(GHOST_LAYERS).filter(|y| *y < grid.size[1]) else { return };
+            for (z, row) in grid.rows(y) {
+                let from = &self.values[(y * grid.size[2] + z) * grid.size[0]..][..grid.size[0]];
+                values[row - padded_y * plane..][..grid.size[0]].copy_from_slice(from);
+            }
+        });
+    }
+
+    fn subtract_gradient(&self, velocity: &mut Velocity, pressure: &[f32], constraint: &Constraint) {
+        let grid = self.grid;
+        let (strides, level) = (grid.strides(), bansho_base::math::simd::level());
+        let scale = constraint.seconds / (constraint.density * grid.spacing as f32);
+        // Faces on the sides: the pressure on them is half a cell from that in the cell.
+        for side in Side::open(self.has_floor) {
+            for SideFace { face, cell, .. } in side.faces(&grid) {
+                let speed = &mut velocity[side.axis][face];
+                let on_side = pressure_on(side, *speed, constraint.ambient);
+                *speed -= 2.0 * scale * side.outward() * (on_side - pressure[cell]);
+            }
+        }
+        for (axis, component) in velocity.iter_mut().enumerate() {
+            let open_faces = constraint.solids.open_faces(axis);
+            component.par_chunks_mut(strides[1]).enumerate().for_each(|(padded_y, values)| {
+                let Some(y) = padded_y.checked_sub(GHOST_LAYERS).filter(|y| *y < grid.size[1]) else { return };
+                if axis == 1 && y == 0 {
+                    return;
+                }
+                let gradient = GradientRows { grid: &grid, axis, pressure, open_faces, scale };
+                dispatch!(level, simd => gradient.subtract(simd, y, values));
+            });
+        }
+    }
+
+    /// Conjugate gradients with the solver of the box without solids as preconditioner (Hestenes and Stiefel 1952), from the pressure of the last step on.
+    fn solve_around_solids(&mut self, solids: &Solids, last: &[f32]) {
+        let cells = self.values.len();
+        let mut buffers = std::mem::take(&mut self.iteration);
+        buffers.iter_mut().for_each(|buffer| buffer.resize(cells, 0.0));
+        let [residual, direction, image, pressure] = &mut buffers;
+        residual.copy_from_slice(&self.values);
+        let target = TOLERANCE * TOLERANCE * dot(residual, residual);
+        for y in 0..self.grid.size[1] {
+            for (z, row) in self.grid.rows(y) {
+                let width = self.grid.size[0];
+                let at = (y * self.grid.size[2] + z) * width;
+                pressure[at..at + width].copy_from_slice(&last[row..row + width]);
+            }
+        }
+        self.apply(solids, pressure, image);
+        subtract(residual, image, 1.0);
+        let mut steepness = 0.0;
+        for iteration in 0..MAX_ITERATIONS {
+            if dot(residual, residual) <= target {
+                break;
+            }
+            self.values.copy_from_slice(residual);
+            self.solver.solve(&mut self.values);
+            self.clear_solids(solids);
+            let next = dot(residual, &self.values);
+            let weight = if iteration == 0 || steepness == 0.0 { 0.0 } else { next / steepness };
+            steepness = next;
+            let weight = weight as f32;
+            direction.par_chunks_mut(CHUNK).zip(self.values.par_chunks(CHUNK)).for_each(|(direction, values)| {
+                direction.iter_mut().zip(values).for_each(|(d, v)| *d = v + weight * *d);
+            });
+            self.apply(solids, direction, image);
+            let curvature = dot(direction, image);
+            if curvature == 0.0 || !curvature.is_finite() {
+                break;
+            }
+            let length = (steepness / curvature) as f32;
+            subtract(pressure, direction, -length);
+            subtract(residual, image, length);
+        }
+        self.values.copy_from_slice(pressure);
+        self.iteration = buffers;
+    }
+
+    /// The seven-point operator around solids, through whose faces there is no gradient.
+    fn apply(&self, solids: &Solids, pressure: &[f32], image: &mut [f32]) {
+        let [width, height, depth] = self.grid.size;
+        let plane = width * depth;
+        let per_area = (1.0 / (self.grid.spacing * self.grid.spacing)) as f32;
+        let strides = self.grid.strides();
+        image.par_chunks_mut(plane).enumerate().for_each(|(y, image)| {
+            for (z, row) in self.grid.rows(y) {
+                for x in 0..width {
+                    let (cell, at) = (row + x, (y * depth + z) * width + x);
+                    let place = z * width + x;
+                    if solids.contains(cell) {
+                        image[place] = 0.0;
+                        continue;
+                    }
+                    let here = pressure[at];
+                    let mut sum = 0.0;
+                    let mut add = |is_inside: bool, neighbor: usize, stays: bool, value: usize| {
+                        if !is_inside {
+                            sum -= if stays { 0.0 } else { 2.0 * here };
+                        } else if !solids.contains(neighbor) {
+                            sum += pressure[value] - here;
+                        }
+                    };
+                    add(x > 0, cell - strides[0], false, at.wrapping_sub(1));
+                    add(x + 1 < width, cell + strides[0], false, at + 1);
+                    add(z > 0, cell - strides[2], false, at.wrapping_sub(width));
+                    add(z + 1 < depth, cell + strides[2], false, at + width);
+                    add(y > 0, cell - strides[1], self.has_floor, at.wrapping_sub(plane));
+                    add(y + 1 < height, cell + strides[1], false, at + plane);
+                    image[place] = per_area * sum;
+                }
+            }
+        });
+    }
+
+    fn clear_solids(&mut self, solids: &Solids) {
+        let grid = self.grid;
+        let plane = grid.size[0] * grid.size[2];
+        self.values.par_chunks_mut(plane).enumerate().for_each(|(y, values)| {
+            for (z, row) in grid.rows(y) {
+                for x in (0..grid.size[0]).filter(|x| solids.contains(row + x)) {
+                    values[z * grid.size[0] + x] = 0.0;
+                }
+            }
+        });
+    }
+}
+
+/// Values per task of sums over all cells.
+const CHUNK: usize = 1 << 14;
+
+/// Inner product. Sums of chunks are added in their order, so that the result does not depend on threads.
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    let sums = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| {
+        let mut lanes = [0.0_f64; LANES];
+        for (a, b) in a.chunks(LANES).zip(b.chunks(LANES)) {
+            for ((sum, a), b) in lanes.iter_mut().zip(a).zip(b) {
+                *sum += f64::from(*a) * f64::from(*b);
+            }
+        }
+        lanes.iter().sum::<f64>()
+    });
+    let sums: Vec<f64> = sums.collect();
+    sums.iter().sum()
+}
+
+/// `a -= factor * b`.
+fn subtract(a: &mut [f32], b: &[f32], factor: f32) {
+    a.par_chunks_mut(CHUNK)
+        .zip(b.par_chunks(CHUNK))
+        .for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= factor * b));
+}
+
+fn pressure_on(side: Side, speed: f32, ambient: &Ambient) -> f32 {
+    let outward = side.outward();
+    side_pressure(speed * outward, ambient.velocity[side.axis] * outward, ambient.density)
+}
+
+#[inline(always)]
+fn divergence_layer<S: Simd>(
+    simd: S,
+    grid: &Grid,
+    velocity: &Velocity,
+    target: &[f32],
+    scale: f32,
+    y: usize,
+    values: &mut [f32],
+) {
+    let per_spacing = Lanes::splat(simd, (1.0 / grid.spacing) as f32);
+    let scale = Lanes::splat(simd, scale);
+    for (z, row) in grid.rows(y) {
+        for x in (0..grid.size[0]).step_by(LANES) {
+            let index = row + x;
+            let mut sum = Lanes::splat(simd, 0.0);
+            for (axis, stride) in grid.strides().into_iter().enumerate() {
+                sum += load(simd, &velocity[axis], index + stride) - load(simd, &velocity[axis], index);
+            }
+            let source = scale * (sum * per_spacing - load(simd, target, index));
+            source.store_slice(&mut values[z * grid.size[0] + x..][..LANES]);
+        }
+    }
+}
+
+/// Subtraction of a component of the gradient from the faces between cells.
+struct GradientRows<'a> {
+    grid: &'a Grid,
+    axis: usize,
+    pressure: &'a [f32],
+    open_faces: Option<&'a [f32]>,
+    scale: f32,
+}
+
+impl GradientRows<'_> {
+    #[inline(always)]
+    fn subtract<S: Simd>(&self, simd: S, y: usize, values: &mut [f32]) {
+        let strides = self.grid.strides();
+        let stride = strides[self.axis];
+        let plane_start = (y + GHOST_LAYERS) * strides[1];
+        let scale = Lanes::splat(simd, self.scale);
+        for (_, row) in self.grid.rows(y).skip(usize::from(self.axis == 2)) {
+            // The first face of a row is on the side.
+            let first = if self.axis == 0 { values[row - plane_start] } else { 0.0 };
+            for x in (0..self.grid.size[0]).step_by(LANES) {
+                let index = row + x;
+                let mut step = scale * (load(simd, self.pressure, index) - load(simd, self.pressure, index - stride));
+                if let Some(open_faces) = self.open_faces {
+                    step *= load(simd, open_faces, index);
+                }
+                let own = &mut values[index - plane_start..][..LANES];
+                (Lanes::from_slice(simd, own) - step).store_slice(own);
+            }
+            if self.axis == 0 {
+                values[row - plane_start] = first;
+            }
+        }
+    }
+}
