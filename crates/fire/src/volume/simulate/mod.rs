@@ -317,7 +317,8 @@ impl ReactionConstants {
             *deficit += cooled;
             temperature -= cooled;
         }
-        *deficit = deficit.clamp(0.0, adiabatic - air);
+        // Fuel may be colder than the air.
+        *deficit = deficit.clamp(0.0, (adiabatic - air).max(0.0));
         let expansion = density / self.mixture.density(temperature) - 1.0;
         ReactedCell { divergence: expansion.clamp(-MAX_EXPANSION, MAX_EXPANSION) / self.seconds, radiated }
     }
@@ -328,7 +329,7 @@ fn flow_settings(shared: &SimulationConstants, mixture: &Mixture, wind: [f32; 3]
         has_floor: shared.parameters.floor,
         smagorinsky: shared.parameters.gas.smagorinsky as f32,
         schmidt: 0.5,
-        least_density: 0.9 * mixture.density(mixture.hottest_k()),
+        least_density: 0.9 * mixture.density(mixture.hottest_k().max(mixture.air_temperature_k)),
         ambient: Ambient { density: mixture.air_density, velocity: wind },
     }
 }
