@@ -106,7 +106,8 @@ impl Series {
         let correlations: Vec<f64> = (0..longest.min(deviations.len() - 1)).map(correlation).collect();
         // After it has fallen below 0 for the first time, the largest value.
         let below = correlations.iter().position(|value| *value < 0.0).unwrap_or(1);
-        let peak = (below..correlations.len()).max_by(|a, b| correlations[*a].total_cmp(&correlations[*b])).unwrap_or(1);
+        let peak =
+            (below..correlations.len()).max_by(|a, b| correlations[*a].total_cmp(&correlations[*b])).unwrap_or(1);
         1.0 / (peak as f64 * self.step_s)
     }
 }
@@ -116,12 +117,19 @@ fn a_fire_grows_to_its_height_and_radiates_the_fraction_of_its_fuel() {
     let wind = still_air();
     let mut simulation = simulation(fire(Fuel::Propane, 0.37, 34.4, 8.0), 1);
     let series = Series::new(&mut simulation, 3.0, &Surroundings::from_wind(&wind));
-    println!("height {:.2} m, puffing {:.2} Hz, radiated {:.2}", series.height(), series.puffing_hz(), series.radiated_share);
+    println!(
+        "height {:.2} m, puffing {:.2} Hz, radiated {:.2}",
+        series.height(),
+        series.puffing_hz(),
+        series.radiated_share
+    );
     // 0.75 m and 2.4 Hz were measured (Hamins et al.); eight cells across the burner are coarse.
     assert!((0.45..1.1).contains(&series.height()), "{} m", series.height());
     assert!((0.15..0.4).contains(&series.radiated_share), "{}", series.radiated_share);
     let [mixtures, deficits] = &simulation.flow.contents.quantities;
-    assert!(mixtures.iter().all(|mixture| (0.0..=1.0).contains(mixture)) && deficits.iter().all(|deficit| *deficit >= 0.0));
+    assert!(
+        mixtures.iter().all(|mixture| (0.0..=1.0).contains(mixture)) && deficits.iter().all(|deficit| *deficit >= 0.0)
+    );
 }
 
 #[test]
@@ -151,7 +159,8 @@ fn fuel_that_flows_in_is_all_in_the_gas_until_it_leaves() {
 
 #[test]
 fn threads_and_snapshots_change_no_bit() {
-    let wind = Wind::new(WindParameters { velocity: Animated::from([1.0, 0.0, 0.5]), ..WindParameters::default() }, 1, None);
+    let wind =
+        Wind::new(WindParameters { velocity: Animated::from([1.0, 0.0, 0.5]), ..WindParameters::default() }, 1, None);
     let mut surroundings = Surroundings::from_wind(&wind);
     surroundings.others.occluders = vec![Occluder::Sphere { center: DVec3::new(0.0, 0.4, 0.0), radius: 0.1 }];
     let step_s = FlameVolumeParameters::default().step_s;
@@ -193,7 +202,8 @@ fn threads_and_snapshots_change_no_bit() {
 
 #[test]
 fn a_storm_leaves_finite_gas() {
-    let storm = WindParameters { velocity: Animated::from([90.0, 20.0, -60.0]), gust: 2.0, ..WindParameters::default() };
+    let storm =
+        WindParameters { velocity: Animated::from([90.0, 20.0, -60.0]), gust: 2.0, ..WindParameters::default() };
     let wind = Wind::new(storm, 1, None);
     for floor in [false, true] {
         let parameters = FlameVolumeParameters { floor, ..fire(Fuel::Methane, 0.3, 40.0, 4.0) };

@@ -15,6 +15,16 @@ const QUARTER: [f32; 4] = [0.070_312_5, 0.611_979_2, 0.315_104_2, 0.002_604_2];
 /// What a ray reads at a point besides the mixture fraction: velocity, m/s, and deficit of heat, K.
 pub(crate) type PointData = [f32; 4];
 
+/// What is seen in a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum BlockContents {
+    Nothing,
+    /// Smoke alone, which is smooth.
+    Smoke,
+    /// A sheet that burns.
+    Sheet,
+}
+
 /// The gas of one state.
 pub(crate) struct GasField {
     /// The grid of the flow, in the world.
@@ -27,39 +37,45 @@ pub(crate) struct GasField {
     mixture: Vec<f32>,
     /// Velocity and deficit in cells.
     data: Vec<PointData>,
-    /// For each block whether anything in or beside it is seen.
-    pub(crate) is_seen: Vec<bool>,
+    /// What is seen in each block or beside it.
+    contents: Vec<BlockContents>,
     blocks: [usize; 3],
     /// Corners of the blocks that are seen, fine points; `None` if none is.
     pub(crate) seen_bounds: Option<[[usize; 3]; 2]>,
 }
 
 impl GasField {
-    /// The gas of a flow at `position` (m). Gas with a mixture fraction of at least `least` is seen.
-    pub(crate) fn new(flow: &Flow, active: &ActiveRows, position: DVec3, refinement: usize, least: f32) -> Self {
+    /// The gas of a flow at `position` (m). Gas with a mixture fraction of at least the first of `least` is seen, from the second on it may be in a sheet.
+    pub(crate) fn new(flow: &Flow, active: &ActiveRows, position: DVec3, refinement: usize, least: [f32; 2]) -> Self {
         let grid = Grid { origin: flow.grid.origin + position, ..flow.grid };
         let size = grid.size.map(|cells| cells * refinement);
         let mixture = refined(flow, active, refinement);
         let data = point_data(flow, active);
         let blocks = size.map(|points| points.div_ceil(BLOCK));
-        let mut field = Self { grid, size, refinement, mixture, data, is_seen: Vec::new(), blocks, seen_bounds: None };
+        let mut field = Self { grid, size, refinement, mixture, data, contents: Vec::new(), blocks, seen_bounds: None };
         field.find_seen_blocks(least);
         field
     }
 
-    fn find_seen_blocks(&mut self, least: f32) {
+    fn find_seen_blocks(&mut self, [least_smoke, least_sheet]: [f32; 2]) {
         let [width, height, depth] = self.size;
         let [columns, layers, rows] = self.blocks;
-        let has_gas: Vec<bool> = (0..layers * rows)
+        let of_points: Vec<BlockContents> = (0..layers * rows)
             .into_par_iter()
             .flat_map_iter(|row| {
                 let (layer, row) = (row / rows, row % rows);
-                let mut seen = vec![false; columns];
+                let mut seen = vec![BlockContents::Nothing; columns];
                 for y in layer * BLOCK..((layer + 1) * BLOCK).min(height) {
                     for z in row * BLOCK..((row + 1) * BLOCK).min(depth) {
                         let values = &self.mixture[(y * depth + z) * width..][..width];
                         for (seen, values) in seen.iter_mut().zip(values.chunks(BLOCK)) {
-                            *seen |= values.iter().any(|value| *value >= least);
+                            let most = values.iter().fold(0.0, |most: f32, value| most.max(*value));
+                            let contents = match most {
+                                most if most >= least_sheet => BlockContents::Sheet,
+                                most if most >= least_smoke => BlockContents::Smoke,
+                                _ => BlockContents::Nothing,
+                            };
+                            *seen = (*seen).max(contents);
                         }
                     }
                 }
@@ -67,17 +83,18 @@ impl GasField {
             })
             .collect();
         // A ray that crosses a block reads points of its neighbors too.
-        let mut seen = vec![false; has_gas.len()];
+        let mut contents = vec![BlockContents::Nothing; of_points.len()];
         let mut bounds: Option<[[usize; 3]; 2]> = None;
         for layer in 0..layers {
             for row in 0..rows {
                 for column in 0..columns {
                     let near = |center: usize, count: usize| center.saturating_sub(1)..(center + 2).min(count);
-                    let is_seen = near(layer, layers).any(|y| {
-                        near(row, rows).any(|z| near(column, columns).any(|x| has_gas[(y * rows + z) * columns + x]))
-                    });
-                    if is_seen {
-                        seen[(layer * rows + row) * columns + column] = true;
+                    let blocks = near(layer, layers).flat_map(|y| near(row, rows).map(move |z| (y, z)));
+                    let around =
+                        blocks.flat_map(|(y, z)| near(column, columns).map(move |x| (y * rows + z) * columns + x));
+                    let most = around.map(|block| of_points[block]).max().unwrap_or(BlockContents::Nothing);
+                    if most > BlockContents::Nothing {
+                        contents[(layer * rows + row) * columns + column] = most;
                         let first = [column, layer, row].map(|block| block * BLOCK);
                         let last = first.map(|point| point + BLOCK);
                         bounds = Some(bounds.map_or([first, last], |[low, high]| {
@@ -90,7 +107,7 @@ impl GasField {
                 }
             }
         }
-        self.is_seen = seen;
+        self.contents = contents;
         self.seen_bounds = bounds;
     }
 
@@ -115,13 +132,13 @@ impl GasField {
             .map(|corners| corners.map(|corner| self.point_in_world(DVec3::from(corner.map(|c| c as f64 - 0.5)))))
     }
 
-    /// Whether anything is seen in the block of a point, and the block.
+    /// What is seen in the block of a point, and the block.
     #[inline(always)]
-    pub(crate) fn block(&self, point: Vec3) -> (bool, [usize; 3]) {
+    pub(crate) fn block(&self, point: Vec3) -> (BlockContents, [usize; 3]) {
         let place = |value: f32, axis: usize| ((value.max(0.0) as usize) / BLOCK).min(self.blocks[axis] - 1);
         let block = [place(point.x, 0), place(point.y, 1), place(point.z, 2)];
         let index = (block[1] * self.blocks[2] + block[2]) * self.blocks[0] + block[0];
-        (self.is_seen[index], block)
+        (self.contents[index], block)
     }
 
     /// Mixture fraction at a point of the fine grid.

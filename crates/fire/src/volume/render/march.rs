@@ -6,7 +6,7 @@ use bansho_base::{
 };
 
 use super::{
-    field::{BLOCK, GasField},
+    field::{BLOCK, BlockContents, GasField},
     sheet::SheetTable,
     smoke::SmokeLight,
 };
@@ -14,6 +14,8 @@ use crate::volume::fuel::Mixture;
 
 /// Length of a step, points of the fine grid.
 const STEP: f32 = 1.0;
+/// Steps that are taken at once through smoke.
+const SMOKE_STRIDE: f64 = 4.0;
 /// Transmittance below which nothing behind is seen.
 const OPAQUE: f32 = 1e-3;
 /// Luminance of the blue zone where a ray crosses it, cd/m^2.
@@ -140,12 +142,27 @@ impl RayMarcher<'_> {
         while number * step < far {
             let depth = number * step;
             let place = (ray.origin + ray.direction * depth).as_vec3();
-            let (is_seen, block) = self.field.block(place);
-            if !is_seen {
-                let exit = exit_depth(ray, block, far);
-                number = (exit / step).ceil().max(number + 1.0);
-                before = None;
-                continue;
+            let (contents, block) = self.field.block(place);
+            match contents {
+                BlockContents::Nothing => {
+                    let exit = exit_depth(ray, block, far);
+                    number = (exit / step).ceil().max(number + 1.0);
+                    before = None;
+                    continue;
+                }
+                BlockContents::Smoke => {
+                    // Strides are multiples of a stride from the camera, too.
+                    let rest = (far / step).ceil() - number;
+                    let stride = (SMOKE_STRIDE - number % SMOKE_STRIDE).min(rest);
+                    number += stride;
+                    before = None;
+                    self.cross_smoke(place, depth, meters * stride as f32, &mut transmittance, &mut gathered);
+                    if transmittance < OPAQUE {
+                        break;
+                    }
+                    continue;
+                }
+                BlockContents::Sheet => {}
             }
             number += 1.0;
             let data = self.field.data(place);
@@ -202,6 +219,24 @@ impl RayMarcher<'_> {
         }
         gathered.opacity = 1.0 - transmittance;
         gathered
+    }
+
+    /// Adds smoke over a way of that many meters.
+    #[inline(always)]
+    fn cross_smoke(&self, place: Vec3, depth: f64, meters: f32, transmittance: &mut f32, gathered: &mut Gathered) {
+        let smoke = self.smoke(self.field.mixture(place), self.field.data(place)[3]);
+        let tau = smoke * meters;
+        if tau <= 0.0 {
+            return;
+        }
+        let seen = *transmittance * (1.0 - approximations::exp(-tau));
+        if let Some(light) = self.smoke_light {
+            let radiance = light.at(place);
+            (0..3).for_each(|c| gathered.scattered[c] += seen * radiance[c]);
+        }
+        gathered.optical_depth += tau;
+        gathered.depth = gathered.depth.min(depth as f32);
+        *transmittance -= seen;
     }
 
     /// Extinction coefficient of smoke, 1/m: what burnt soot there is in lean gas.

@@ -99,10 +99,11 @@ pub(crate) struct RenderedGas<'a> {
 }
 
 impl RenderedGas<'_> {
-    /// The mixture fraction from which on gas is seen.
-    pub(crate) fn least_seen(&self) -> f32 {
+    /// The mixture fractions from which on gas is seen, and from which on it may burn.
+    pub(crate) fn least_seen(&self) -> [f32; 2] {
         let has_smoke = self.smoke_yield * self.rendering.soot_gain > 0.0;
-        self.mixture.stoichiometric * if has_smoke { LEAST_SMOKE } else { LEAST_SEEN }
+        let sheet = LEAST_SEEN * self.mixture.stoichiometric;
+        [if has_smoke { LEAST_SMOKE * self.mixture.stoichiometric } else { sheet }, sheet]
     }
 }
 

@@ -91,7 +91,15 @@ impl Simulation {
         let grid = if is_coarse { shared.coarse_grid } else { shared.coarse_grid.refined() };
         let flow = Flow::new(grid, flow_settings(&shared, &mixture, wind));
         let active = ActiveRows::around(&flow.grid, 0, |_| false);
-        Self { shared, flow, active, air: air.clone(), mixture, emission_factor: 1.0, figures: VolumeFigures::default() }
+        Self {
+            shared,
+            flow,
+            active,
+            air: air.clone(),
+            mixture,
+            emission_factor: 1.0,
+            figures: VolumeFigures::default(),
+        }
     }
 
     /// Whether the flame is still on the coarse grid.
