@@ -19,6 +19,7 @@ use bansho::{
 };
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
 use crate::error;
 
@@ -163,6 +164,17 @@ impl Assets for ArrayAssets {
 
 /// A picture of sRGB codes, height x width x 3 or 4; alpha is straight and blends encoded values.
 pub(crate) fn picture_of_codes(codes: &PyReadonlyArray3<u8>) -> PyResult<Picture> {
+    let (shape, codes) = codes_of(codes)?;
+    picture(shape, pixels_of_codes(shape, codes), Encoding::DisplaySrgb)
+}
+
+/// The shape and the codes of an array of codes.
+pub(crate) fn codes_of<'a>(codes: &'a PyReadonlyArray3<u8>) -> PyResult<(Shape, &'a [u8])> {
+    Ok((checked_shape(codes.shape())?, contiguous(codes.as_slice())?))
+}
+
+/// Encoded values of 0 to 1 of codes, in the pool of the caller.
+pub(crate) fn pixels_of_codes(shape: Shape, codes: &[u8]) -> Vec<[f32; 4]> {
     /// The values of the codes.
     const VALUES: [f32; 256] = {
         let mut values = [0.0; 256];
@@ -173,21 +185,22 @@ pub(crate) fn picture_of_codes(codes: &PyReadonlyArray3<u8>) -> PyResult<Picture
         }
         values
     };
-    let (shape, codes) = (checked_shape(codes.shape())?, contiguous(codes.as_slice())?);
-    let mut pixels = Vec::with_capacity(shape.height * shape.width);
-    match shape.channels {
+    let [height, width] = [shape.height, shape.width];
+    let mut pixels = vec![[0.0; 4]; height * width];
+    let rows = pixels.par_chunks_mut(width).zip(codes.par_chunks(width * shape.channels));
+    rows.for_each(|(pixels, codes)| match shape.channels {
         3 => {
-            for &[r, g, b] in codes.as_chunks::<3>().0 {
-                pixels.push([VALUES[r as usize], VALUES[g as usize], VALUES[b as usize], 1.0]);
+            for (pixel, &[r, g, b]) in pixels.iter_mut().zip(codes.as_chunks::<3>().0) {
+                *pixel = [VALUES[usize::from(r)], VALUES[usize::from(g)], VALUES[usize::from(b)], 1.0];
             }
         }
         _ => {
-            for &rgba in codes.as_chunks::<4>().0 {
-                pixels.push(rgba.map(|code| VALUES[code as usize]));
+            for (pixel, &rgba) in pixels.iter_mut().zip(codes.as_chunks::<4>().0) {
+                *pixel = rgba.map(|code| VALUES[usize::from(code)]);
             }
         }
-    }
-    picture(shape, pixels, Encoding::DisplaySrgb)
+    });
+    pixels
 }
 
 /// A picture of floats, height x width x 3 or 4. Alpha of linear light is associated, else straight.
@@ -203,7 +216,7 @@ pub(crate) fn picture_of_floats(values: &PyReadonlyArray3<f32>, encoding: Encodi
     picture(shape, pixels, encoding)
 }
 
-fn picture(shape: Shape, pixels: Vec<[f32; 4]>, encoding: Encoding) -> PyResult<Picture> {
+pub(crate) fn picture(shape: Shape, pixels: Vec<[f32; 4]>, encoding: Encoding) -> PyResult<Picture> {
     let color = Image::from_pixels(shape.width, shape.height, pixels);
     let color = color.ok_or_else(|| error::value("an image without pixels".to_owned()))?;
     let mut picture = Picture::opaque(color, encoding);
@@ -234,7 +247,7 @@ pub(crate) fn depth_map(depth: &PyReadonlyArray2<f32>) -> PyResult<DepthMap> {
 
 /// Height, width and channels of an array of pixels.
 #[derive(Clone, Copy)]
-struct Shape {
+pub(crate) struct Shape {
     height: usize,
     width: usize,
     channels: usize,
@@ -243,7 +256,9 @@ struct Shape {
 fn checked_shape(shape: &[usize]) -> PyResult<Shape> {
     match *shape {
         [height, width, channels @ (3 | 4)] if height > 0 && width > 0 => Ok(Shape { height, width, channels }),
-        _ => Err(error::value(format!("an image of shape {shape:?}; allowed: (height, width, 3) or (height, width, 4)"))),
+        _ => {
+            Err(error::value(format!("an image of shape {shape:?}; allowed: (height, width, 3) or (height, width, 4)")))
+        }
     }
 }
 

@@ -106,8 +106,7 @@ pub(crate) fn scene(error: &SceneError) -> PyErr {
 
 /// The exception for parameters that a program has set.
 pub(crate) fn parameters(problems: &ParameterProblems) -> PyErr {
-    let entries: Vec<ProblemEntry> =
-        problems.0.listed.iter().map(|problem| ProblemEntry::new(problem, None)).collect();
+    let entries: Vec<ProblemEntry> = problems.0.listed.iter().map(|problem| ProblemEntry::new(problem, None)).collect();
     scene_exception(&problems.to_string(), entries)
 }
 
@@ -122,10 +121,7 @@ pub(crate) fn edit(error: &EditError) -> PyErr {
         _ => (None, Vec::new()),
     };
     let message = error.to_string();
-    scene_exception(
-        &message.clone(),
-        [ProblemEntry { line: None, column: None, key, message, allowed, choices }],
-    )
+    scene_exception(&message.clone(), [ProblemEntry { line: None, column: None, key, message, allowed, choices }])
 }
 
 /// The exception for what only building finds, of a scene without text.

@@ -86,7 +86,8 @@ pub(crate) fn write_files(
         16 => BitDepth::Sixteen,
         _ => return Err(error::value(format!("bits: {bits}; allowed: 8, 16"))),
     };
-    let stem = PathBuf::from(&name).file_stem().map_or_else(|| name.clone(), |stem| stem.to_string_lossy().into_owned());
+    let stem =
+        PathBuf::from(&name).file_stem().map_or_else(|| name.clone(), |stem| stem.to_string_lossy().into_owned());
     let scene = SceneFile { name, stem, folder, text, changes: Vec::new(), input_limits: InputLimits::default() };
     let job = Job {
         frames,

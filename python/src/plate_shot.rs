@@ -6,8 +6,8 @@ use std::{
 };
 
 use bansho::{
-    ColorSpace, CompiledScene, DisplayImage, DisplayOptions, Frame, Plan, PlanOptions, RenderError, Scene,
-    SceneLinear, SceneOptions,
+    ColorSpace, CompiledScene, DisplayImage, DisplayOptions, Frame, Plan, PlanOptions, RenderError, Scene, SceneLinear,
+    SceneOptions,
     base::{
         color::LinearTransform,
         frame::DisplayPixels,
@@ -17,6 +17,7 @@ use bansho::{
 };
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::{prelude::*, types::PyDict};
+use rayon::prelude::*;
 
 use crate::{
     assets::{self, ArrayAssets},
@@ -53,6 +54,23 @@ struct Plate {
     depth: Option<DepthMap>,
 }
 
+/// A picture, or the codes of one, which are converted in the pool.
+enum Source<'a> {
+    Codes((assets::Shape, &'a [u8])),
+    Picture(Picture),
+}
+
+impl Source<'_> {
+    fn picture(self) -> PyResult<Picture> {
+        match self {
+            Self::Codes((shape, codes)) => {
+                assets::picture(shape, assets::pixels_of_codes(shape, codes), Encoding::DisplaySrgb)
+            }
+            Self::Picture(picture) => Ok(picture),
+        }
+    }
+}
+
 /// What is drawn: codes of a picture of codes, light of a picture of light.
 enum Drawn {
     Codes(DisplayImage, Option<Frame>),
@@ -64,6 +82,7 @@ enum Failure {
     Plan(bansho::PlanError),
     Render(RenderError),
     Poisoned(work::Poisoned),
+    Exception(PyErr),
 }
 
 impl From<Failure> for PyErr {
@@ -73,6 +92,7 @@ impl From<Failure> for PyErr {
             Failure::Plan(reason) => error::plan(&reason),
             Failure::Render(reason) => error::render(&reason),
             Failure::Poisoned(poisoned) => poisoned.into(),
+            Failure::Exception(exception) => exception,
         }
     }
 }
@@ -161,13 +181,14 @@ impl PlateShot {
         let scene = scene.with_options(&SceneOptions::default()).map_err(|looping| error::looping(&looping))?;
         let encoding = assets::parse_encoding(encoding)?;
         let image = match &image {
-            Pixels::Codes(codes) => assets::picture_of_codes(codes)?,
-            Pixels::Floats(values) => assets::picture_of_floats(values, encoding)?,
+            Pixels::Codes(codes) => Source::Codes(assets::codes_of(codes)?),
+            Pixels::Floats(values) => Source::Picture(assets::picture_of_floats(values, encoding)?),
         };
         let depth = depth.as_ref().map(assets::depth_map).transpose()?;
         let frame = [number, i64::from(truth)];
         let drawn = work::run(py, self.threads, |observer| {
             let mut state = work::lock(&self.state).map_err(Failure::Poisoned)?;
+            let image = image.picture().map_err(Failure::Exception)?;
             let drawn = state.draw(scene, text, Plate { image, depth }, frame, observer)?;
             Ok::<Converted, Failure>(Converted::of(drawn))
         })??;
@@ -188,10 +209,10 @@ impl Converted {
         match drawn {
             Drawn::Codes(image, truth) => {
                 let codes = match image.pixels {
-                    DisplayPixels::Eight(codes) => codes.into_iter().map(|[r, g, b, _]| [r, g, b]).collect(),
+                    DisplayPixels::Eight(codes) => codes.into_par_iter().map(|[r, g, b, _]| [r, g, b]).collect(),
                     // Eight bits are asked for.
                     DisplayPixels::Sixteen(codes) => {
-                        codes.into_iter().map(|[r, g, b, _]| [r, g, b].map(|code| (code >> 8) as u8)).collect()
+                        codes.into_par_iter().map(|[r, g, b, _]| [r, g, b].map(|code| (code >> 8) as u8)).collect()
                     }
                 };
                 Self { size: [image.height, image.width], codes: Some(codes), light: None, truth }

@@ -66,7 +66,8 @@ pub(crate) fn value_at<'py>(
         Err(_) if is_settable(text, path) => Ok(None),
         Err(missing) => {
             let (path, segment) = (path.to_owned(), missing.segment.to_owned());
-            let unknown = EditError::NoSuchPath { path, segment, available: missing.available, suggestions: Vec::new() };
+            let unknown =
+                EditError::NoSuchPath { path, segment, available: missing.available, suggestions: Vec::new() };
             Err(error::edit(&unknown))
         }
     }
@@ -105,7 +106,8 @@ fn find<'v, 'p>(value: &'v Value, segments: &[&'p str]) -> Result<&'v Value, Mis
                 _ => {
                     let names = items.iter().filter_map(|item| name_of(&item.value));
                     let names: String = names.map(|name| format!(" or {name}")).collect();
-                    let numbers = if items.is_empty() { "nothing".to_owned() } else { format!("0 to {}", items.len() - 1) };
+                    let numbers =
+                        if items.is_empty() { "nothing".to_owned() } else { format!("0 to {}", items.len() - 1) };
                     Err(Missing { segment: first, available: numbers + &names })
                 }
             }

@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex};
 
 use bansho::{
-    CompiledScene, DisplayOptions, GlareUse, Plan, PlanOptions, Rect, RenderError, SceneLinear, SceneOptions, View,
-    BitDepth, ViewName, base::phenomenon::surroundings::Emitter,
+    BitDepth, CompiledScene, DisplayOptions, GlareUse, Plan, PlanOptions, Rect, RenderError, SceneLinear, SceneOptions,
+    View, ViewName, base::phenomenon::surroundings::Emitter,
 };
 use pyo3::{prelude::*, types::PyDict};
 
@@ -112,8 +112,7 @@ impl Shot {
             let mut light = Plan::new(&compiled, &of_light).map_err(Refusal::Plan)?;
             light.fingerprint_frames = false;
             let (exposure, start) = (light.exposure_ev100, light.loop_start);
-            let finished =
-                Plan::with_exposure_and_loop_start(light.scene().clone(), &of_display, exposure, start);
+            let finished = Plan::with_exposure_and_loop_start(light.scene().clone(), &of_display, exposure, start);
             let mut finished = finished.map_err(Refusal::Plan)?;
             (finished.depth, finished.fingerprint_frames) = (false, false);
             Ok((compiled, Arc::new(light), Arc::new(finished)))
@@ -153,12 +152,8 @@ impl Shot {
         };
         let view = self.finished.display;
         let convention = alpha.map(frame::parse_alpha).transpose()?;
-        let options = DisplayOptions {
-            view,
-            depth,
-            alpha: convention.unwrap_or_default(),
-            over_black: convention.is_none(),
-        };
+        let options =
+            DisplayOptions { view, depth, alpha: convention.unwrap_or_default(), over_black: convention.is_none() };
         let drawn = self.at_frame(py, number, &self.finished, |shot, observer| shot.draw(&options, observer))?;
         frame::display_array(py, drawn.image)
     }

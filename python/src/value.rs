@@ -117,7 +117,11 @@ pub(crate) fn values_in_effect(scene: &Scene) -> Table {
     root.push("air", Value::Table(scene.air.to_table()));
     for shared in scene.tables.iter() {
         let table = Value::Table(shared.parameters.canonical());
-        if shared.kind.is_list() { append(&mut root, shared.kind.key, table) } else { root.push(shared.kind.key, table) }
+        if shared.kind.is_list() {
+            append(&mut root, shared.kind.key, table)
+        } else {
+            root.push(shared.kind.key, table)
+        }
     }
     for instance in &scene.instances {
         let mut table = Table::default();

@@ -171,7 +171,7 @@ impl PlateRows<'_> {
 }
 
 /// Light of an encoded value, by a table for the codes of 8 bits.
-fn decoded(value: f32) -> f32 {
+pub(crate) fn decoded(value: f32) -> f32 {
     let code = (value * 255.0 + 0.5) as u8;
     if f32::from(code) / 255.0 == value { color::decode_srgb8(code) } else { color::decode_srgb(value) }
 }

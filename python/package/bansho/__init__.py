@@ -18,7 +18,7 @@
 
 from __future__ import annotations
 
-from . import plot, tables
+from . import datasets, labels, plot, tables, transforms
 from ._bansho import __version__
 from .errors import InternalError, PhysicalStrengthNotice, Problem, SceneError
 from .frame import Aov, Figure, Frame, FrameCamera, FrameLight
@@ -46,8 +46,10 @@ __all__ = [
     "Shot",
     "__version__",
     "augment_strength",
+    "datasets",
     "derived_seed",
     "fog",
+    "labels",
     "open",
     "plot",
     "rain",
@@ -55,6 +57,7 @@ __all__ = [
     "rain_stereo",
     "rain_video",
     "tables",
+    "transforms",
     *_physics,
     *tables.__all__,
 ]

@@ -116,6 +116,8 @@ class Shot:
         """See `bansho.open`."""
         if space not in ("acescg", "linear_srgb"):
             raise ValueError(f'space: {space!r}; allowed: "acescg", "linear_srgb"')
+        for name in ("size", "crop"):
+            options[name] = _sides(options.get(name), name)
         self.scene = scene.copy()
         """The scene that is drawn."""
         self._space: Space = space
@@ -235,6 +237,17 @@ def _whole(number: Any) -> int:
         return int(number.__index__())
     except AttributeError:
         raise ValueError(f"a frame number of type {type(number).__name__}; allowed: int") from None
+
+
+def _sides(given: Any, name: str) -> tuple[int, ...] | None:
+    """Numbers of pixels, none below 0."""
+    if given is None:
+        return None
+    sides = tuple(_whole(side) for side in given)
+    count = 2 if name == "size" else 4
+    if len(sides) != count or min(sides) < 0:
+        raise ValueError(f"{name}: {given!r}; allowed: {count} numbers of pixels, none below 0")
+    return sides
 
 
 def _reporter(progress: bool | Progress, count: int) -> Progress:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import warnings
 from collections import OrderedDict
@@ -25,8 +26,10 @@ AUGMENT_OPACITY = 0.2
 """Opacity on its axis that the streak of a drop of 1.6 mm has with `visibility="augment"`."""
 STRONGEST = 20.0
 """Largest strength."""
-
-_LIGHT_PRECISION = np.float32
+ASSUMED_EV100 = 12.0
+"""Exposure value at ISO 100 that is assumed of a picture: that of a street under heavy clouds."""
+REACH_M = 1000.0
+"""How far from the camera it rains, m, unless `parameters` has another `airlight_distance`."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,11 @@ def _notice() -> None:
         'the rain is as strong as physics makes it: on a photograph by day 20 mm/h is hardly seen. For training data pass visibility="augment" or a '
         'strength above 1; strength="physical" is the default, and silences this notice'
     )
-    warnings.warn(message, PhysicalStrengthNotice, stacklevel=4)
+    # It is about the first line outside of this package.
+    level, frame = 1, sys._getframe()
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "bansho":
+        level, frame = level + 1, frame.f_back  # type: ignore[assignment]
+    warnings.warn(message, PhysicalStrengthNotice, stacklevel=level)
 
 
 def rain_scene(
@@ -144,7 +151,7 @@ def rain_scene(
     depth: bool = True,
     depth_kind: DepthKind = "axis",
     depth_scale: float | None = None,
-    exposure_ev100: float | None = None,
+    exposure_ev100: float = ASSUMED_EV100,
     splashes: float = 0.0,
     fps: float = 30.0,
     frames: int = 1,
@@ -156,11 +163,19 @@ def rain_scene(
     """
     height, width = size
     poses = _poses(pose)
-    plate: dict[str, Any] = {"image": "image", "depth": "depth" if depth else None, "exposure_ev100": exposure_ev100}
+    plate: dict[str, Any] = {"image": "image", "depth": "depth" if depth else None, "exposure_ev100": _float(exposure_ev100, "exposure_ev100")}
     if depth:
         plate |= {"depth_kind": depth_kind, "depth_scale": None if depth_scale is None else float(depth_scale)}
-    gain = _strength(strength, visibility, exposure_s)
-    given = {"rate_mm_per_h": _float(rate_mm_per_h, "rate_mm_per_h"), "method": "drops", "opacity_gain": gain, "splashes": {"fraction": float(splashes)}}
+    given: dict[str, Any] = {
+        "rate_mm_per_h": _float(rate_mm_per_h, "rate_mm_per_h"),
+        "method": "drops",
+        "opacity_gain": _strength(strength, visibility, exposure_s),
+        "airlight_distance": REACH_M,
+        "splashes": {"fraction": _float(splashes, "splashes")},
+    }
+    if not splashes:
+        # What the picture shows ends the rain, not a level ground, of which nothing is known.
+        given["ground_height"] = float(poses[0][1, 3]) - 1e4
     return Scene(
         {
             "picture": {"size": [width, height], "frames": frames, "fps": _rate(fps), "seed": _seed(seed)},
@@ -265,7 +280,7 @@ def rain(
     truth: bool = False,
     depth_kind: DepthKind = "axis",
     depth_scale: float | None = None,
-    exposure_ev100: float | None = None,
+    exposure_ev100: float = ASSUMED_EV100,
     splashes: float = 0.0,
     threads: int | None = None,
     parameters: Mapping[str, Any] | None = None,
@@ -289,7 +304,7 @@ def rain(
     :param exposure_ev100: exposure value of the picture at ISO 100; it matters only to lamps and fires.
     :param splashes: fraction of the drops that splash on a level ground 1.6 m below the camera.
     :param threads: `None` for one for each core.
-    :param parameters: further keys of `[[rain]]`, such as ``{"distance": 9.0}``.
+    :param parameters: further keys of `[[rain]]`, such as ``{"distance": 9.0}``. Streaks are drawn within 5 m, and it rains within 1 km.
     """
     pixels = _arrays.as_numpy(image, "image")
     options: dict[str, Any] = {
@@ -367,7 +382,7 @@ def rain_video(
     visibility: Literal["physical", "augment"] | None = None,
     depth_kind: DepthKind = "axis",
     depth_scale: float | None = None,
-    exposure_ev100: float | None = None,
+    exposure_ev100: float = ASSUMED_EV100,
     splashes: float = 0.0,
     parameters: Mapping[str, Any] | None = None,
 ) -> Any:
@@ -458,7 +473,7 @@ def fog(
         {
             "picture": {"size": [size[1], size[0]], "frames": 1},
             "camera": {**_camera.pose_keys(_poses(pose), 1.0), **_camera.intrinsics(camera, size), "glare": 0.0},
-            "plate": {"image": "image", "depth": "depth", "depth_kind": depth_kind, "depth_scale": scale},
+            "plate": {"image": "image", "depth": "depth", "depth_kind": depth_kind, "depth_scale": scale, "exposure_ev100": ASSUMED_EV100},
             "fog": {"visibility_m": _float(visibility_m, "visibility_m")},
         }
     )
