@@ -29,7 +29,7 @@ def test_attenuation_follows_the_rain_rate():
 
 
 def test_a_picture_is_dimmed_as_its_truth_says():
-    """Dark light is what the veil adds, so the difference of two pictures falls by the transmission alone."""
+    """What airlight adds is the same everywhere, so the difference of two pictures falls by the transmission alone."""
     depth = np.full((180, 320), 150.0, np.float32)
     options = {"rate_mm_per_h": 60.0, "camera": K, "strength": "physical", "truth": True, "seed": 5}
     bright = np.full((180, 320, 3), 0.30, np.float32)

@@ -35,10 +35,10 @@ def test_an_interrupt_stops_the_work_within_100_ms():
     with pytest.raises(KeyboardInterrupt):
         shot.render(199)
     elapsed = time.perf_counter() - sent[0]
-    # Other programs on the machine may take the time of a thread.
-    assert elapsed < 0.1 * float(os.environ.get("BANSHO_SLOW", "3")), f"{elapsed * 1e3:.0f} ms"
-    # The shot goes on from where it was.
-    assert bansho.open(bansho.Scene.parse(LONG), size=(32, 18), threads=1) is not None
+    # 0.1 s on an idle machine; other programs may take the time of a thread.
+    assert elapsed < 0.3, f"{elapsed * 1e3:.0f} ms"
+    # Other work goes on.
+    assert shot.time_of(0) == 0.0
 
 
 def test_other_threads_run_while_a_frame_is_drawn():
@@ -53,7 +53,8 @@ def test_other_threads_run_while_a_frame_is_drawn():
 
     thread = threading.Thread(target=count)
     thread.start()
-    shot.render(0)
+    for number in range(10):
+        shot.render(number)
     is_done.set()
     thread.join()
     assert counted[0] > 5

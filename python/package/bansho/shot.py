@@ -191,6 +191,10 @@ class Shot:
         """The camera at the middle of the exposure of a frame."""
         return camera_of(self._shot.camera(_whole(number)))
 
+    def time_of(self, number: int) -> float:
+        """Time at which a frame begins, s."""
+        return self._shot.time(_whole(number))
+
     @property
     def range(self) -> tuple[int, int]:
         """The first frame, and the one after the last."""

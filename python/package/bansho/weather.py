@@ -43,7 +43,7 @@ class RainTruth:
     diameter_mm: NDArray[np.float32]
     """Diameter of the drop of the nearest streak, mm; 0 where there is none."""
     transmission: NDArray[np.float32]
-    """Fraction of the light of the picture that passes streaks and veil."""
+    """Fraction of the light of the picture that passes streaks and the medium."""
 
     @property
     def streak_mask(self) -> NDArray[np.bool_]:
@@ -51,8 +51,8 @@ class RainTruth:
         return self.streak_opacity >= 0.01
 
     @property
-    def veil_transmission(self) -> NDArray[np.float32]:
-        """Fraction of the light that passes the veil: the rain that is too far for streaks."""
+    def medium_transmission(self) -> NDArray[np.float32]:
+        """Fraction of the light that passes the medium: all drops that are not streaks."""
         return np.minimum(self.transmission / np.maximum(1 - self.streak_opacity, 1e-3), 1).astype(np.float32)
 
 
@@ -285,10 +285,10 @@ def rain(
     threads: int | None = None,
     parameters: Mapping[str, Any] | None = None,
 ) -> Any:
-    """Rain over a picture: streaks of drops whose number, speed, opacity and light follow from physics, and the veil of those that are far.
+    """Rain over a picture: streaks of drops whose number, speed, opacity and light follow from physics, and the airlight of those that are far.
 
     :param image: (H, W, 3 or 4) `uint8` (sRGB) or floats (linear sRGB); or a batch (N, H, W, 3), each of which gets rain of its own.
-    :param depth: (H, W) in m, or integers with `depth_scale`; it hides what is behind, and sets how much veil is in front. `None` for infinitely far.
+    :param depth: (H, W) in m, or integers with `depth_scale`; it hides what is behind, and sets how much airlight is in front. `None` for infinitely far.
     :param rate_mm_per_h: rain rate, 0 to 300: 1 drizzle, 5 rain, 20 heavy, 70 a downpour; of a batch also one for each.
     :param camera: matrix K (3 x 3, OpenCV) in pixels; `None` for a lens of 28 mm on 24 mm of sensor height.
     :param pose: 4 x 4, world from camera (right, up, backward; y up; m); `None` for a level camera 1.6 m above the ground.
@@ -296,7 +296,7 @@ def rain(
     :param wind: its velocity in m/s: x to the right, y up, z toward the viewer of a camera that is not rotated.
     :param gust: standard deviation of the speed of the wind divided by its mean.
     :param seed: of the drops. The same arguments give the same bytes.
-    :param strength: `"physical"`, or a factor of the opacity of streaks and veil up to 20.
+    :param strength: `"physical"`, or a factor of the opacity of streaks and airlight up to 20.
     :param visibility: `"augment"` for the strength at which streaks are seen by day, `augment_strength(exposure_s)`.
     :param truth: whether a `RainTruth` comes with the picture (of a batch a list of them).
     :param depth_kind: `"axis"`, `"distance"` or `"inverse"`, which needs `depth_scale`.
