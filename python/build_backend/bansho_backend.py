@@ -15,7 +15,7 @@ import subprocess
 from pathlib import Path
 
 import maturin
-from maturin import (  # noqa: F401
+from maturin import (
     get_requires_for_build_editable,
     get_requires_for_build_sdist,
     get_requires_for_build_wheel,
@@ -73,16 +73,22 @@ def _prepare() -> None:
         os.environ["MATURIN_PEP517_ARGS"] = f"{os.environ.get('MATURIN_PEP517_ARGS', '')} --profile={profile}".strip()
 
 
-def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):  # noqa: ANN001, ANN201, D103
+def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
+    _write_notices()
+    SCRIPTS.mkdir(parents=True, exist_ok=True)
+    return maturin.prepare_metadata_for_build_wheel(metadata_directory, config_settings)
+
+
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     _prepare()
     return maturin.build_wheel(wheel_directory, config_settings, metadata_directory)
 
 
-def build_editable(wheel_directory, config_settings=None, metadata_directory=None):  # noqa: ANN001, ANN201, D103
+def build_editable(wheel_directory, config_settings=None, metadata_directory=None):
     _prepare()
     return maturin.build_editable(wheel_directory, config_settings, metadata_directory)
 
 
-def build_sdist(sdist_directory, config_settings=None):  # noqa: ANN001, ANN201, D103
+def build_sdist(sdist_directory, config_settings=None):
     # The crates beside this folder are not part of it, so that a source distribution could not be built.
     raise RuntimeError("there is no source distribution: install from a checkout of the repository, or a wheel")

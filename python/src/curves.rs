@@ -122,7 +122,6 @@ pub(crate) fn streak_opacity<'py>(
 
 /// Streak textures of a cube of rain, size x size for each diameter, with the drops: diameter (mm), speed (m/s), position (m).
 #[pyfunction]
-#[allow(clippy::type_complexity, reason = "two arrays, which Python takes apart at once")]
 pub(crate) fn streak_textures<'py>(
     py: Python<'py>,
     rate_mm_per_h: f64,
@@ -169,12 +168,11 @@ fn parse_shape(name: &str) -> PyResult<SpectrumShape> {
 /// Auroral lines: name, wavelength in nm.
 #[pyfunction]
 pub(crate) fn aurora_lines() -> Vec<(&'static str, f64)> {
-    LINES.iter().map(|line| (line.name, f64::from(line.wavelength_nm))).collect()
+    LINES.iter().map(|line| (line.name, line.wavelength_nm)).collect()
 }
 
 /// Altitudes in km; volume emission rate of each line by altitude, photons/(m^3 s); brightness of each line seen along the column, kR.
 #[pyfunction]
-#[allow(clippy::type_complexity, reason = "three arrays, which Python takes apart at once")]
 pub(crate) fn aurora_emission<'py>(
     py: Python<'py>,
     energy_ev: f64,

@@ -23,11 +23,11 @@ from ._bansho import __version__
 from .errors import InternalError, PhysicalStrengthNotice, Problem, SceneError
 from .frame import Aov, Figure, Frame, FrameCamera, FrameLight
 from .live import Effect
-from .physics import *  # noqa: F403
+from .physics import *
 from .physics import __all__ as _physics
 from .scene import Scene
-from .shot import Shot, open  # noqa: A004
-from .tables import *  # noqa: F403
+from .shot import Shot, open
+from .tables import *
 from .weather import RainTruth, augment_strength, derived_seed, fog, rain, rain_scene, rain_stereo, rain_video
 
 __all__ = [

@@ -57,7 +57,7 @@ def stored_arrays(scene: Scene, arrays: Mapping[str, Any] | None) -> _bansho.Arr
     return stored
 
 
-def open(  # noqa: A001
+def open(
     scene: Scene | str | os.PathLike[str] | Mapping[str, Any],
     *,
     size: tuple[int, int] | None = None,

@@ -59,7 +59,9 @@ def _optional(annotation: str) -> str:
 
 def stub() -> str:
     """The text of `tables.pyi`."""
-    return _HEAD + "".join("\n" + _class_stub(table) for table in _bansho.table_descriptors())
+    names = ", ".join(f'"{class_name(table["key"])}"' for table in _bansho.table_descriptors())
+    listed = textwrap.fill(f'__all__ = ["SceneTable", {names}]', 120, subsequent_indent="    ")
+    return _HEAD + f"\n{listed}\n" + "".join("\n" + _class_stub(table) for table in _bansho.table_descriptors())
 
 
 def main() -> None:

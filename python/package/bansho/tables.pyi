@@ -24,6 +24,9 @@ def parameter_lines(parameter: dict[str, Any]) -> str: ...
 def common_parameters(table: dict[str, Any]) -> list[dict[str, Any]]: ...
 def all_parameters(table: dict[str, Any]) -> list[dict[str, Any]]: ...
 
+__all__ = ["SceneTable", "Picture", "Camera", "Plate", "Wind", "Air", "Sky", "Ground", "Light", "Obstacle", "Fog",
+    "FlameSheet", "FlameParticles", "Rain", "Aurora"]
+
 class Picture(SceneTable):
     """Size, frames and exposure of the picture.
 

@@ -13,9 +13,9 @@ __all__ = ["Fog", "Rain"]
 Interval = float | tuple[float, float]
 
 
-def _interval(value: Interval, name: str) -> tuple[float, float]:
+def _interval(value: Any, name: str) -> tuple[float, float]:
     """A number, or the ends of an interval."""
-    low, high = (value, value) if np.isscalar(value) else value  # type: ignore[misc]
+    low, high = (value, value) if np.isscalar(value) else value
     if not (np.isfinite(low) and np.isfinite(high) and low <= high):
         raise ValueError(f"{name}: {value!r}; allowed: a number, or (low, high)")
     return float(low), float(high)

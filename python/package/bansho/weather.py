@@ -9,7 +9,7 @@ import warnings
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, overload
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -260,10 +260,6 @@ def _truth_of(values: Mapping[str, Any]) -> RainTruth:
     )
 
 
-@overload
-def rain(image: ArrayLike, depth: ArrayLike | None = ..., *, truth: Literal[False] = ..., **options: Any) -> NDArray[Any]: ...
-@overload
-def rain(image: ArrayLike, depth: ArrayLike | None = ..., *, truth: Literal[True], **options: Any) -> tuple[NDArray[Any], Any]: ...
 def rain(
     image: ArrayLike,
     depth: ArrayLike | None = None,
@@ -325,12 +321,10 @@ def rain(
         return _rain_one(pixels, depth, {**options, "rate_mm_per_h": rate_mm_per_h, "seed": seed}, 0, truth, threads)
     rates = np.broadcast_to(np.asarray(rate_mm_per_h, dtype=np.float64), (len(pixels),))
     depths = _each(depth, len(pixels))
-    drawn = [
-        _rain_one(pixels[index], depths[index], {**options, "rate_mm_per_h": rates[index], "seed": derived_seed(seed, index)}, 0, True, threads)
-        if truth
-        else _rain_one(pixels[index], depths[index], {**options, "rate_mm_per_h": rates[index], "seed": derived_seed(seed, index)}, 0, False, threads)
-        for index in range(len(pixels))
-    ]
+    drawn = []
+    for index, (picture, plane, rate) in enumerate(zip(pixels, depths, rates, strict=True)):
+        own = {**options, "rate_mm_per_h": rate, "seed": derived_seed(seed, index)}
+        drawn.append(_rain_one(picture, plane, own, 0, truth, threads))
     if not truth:
         return np.stack(drawn) if drawn else pixels.copy()
     return np.stack([picture for picture, _ in drawn]), [values for _, values in drawn]
