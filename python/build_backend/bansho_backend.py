@@ -51,7 +51,7 @@ def _write_notices() -> None:
             continue
         parts.append(f"\n{'=' * 80}\n{package['name']} {package['version']}: {package['license'] or 'see its license file'}\n{package['repository'] or ''}\n")
         folder = Path(package["manifest_path"]).parent
-        files = [path for path in sorted(folder.iterdir()) if path.is_file() and path.name.upper().startswith(("LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"))]
+        files = [path for path in sorted(folder.iterdir()) if path.is_file() and path.name.upper().startswith(("LICEN", "COPYING", "NOTICE", "UNLICENSE"))]
         parts += [f"\n--- {path.name}\n{path.read_text(encoding='utf-8', errors='replace')}" for path in files]
     NOTICES.write_text("".join(parts), encoding="utf-8")
 

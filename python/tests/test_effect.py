@@ -51,7 +51,7 @@ def test_wind_camera_and_flames_change_live():
         (lambda effect: effect.set_wind((500, 0, 0)), "wind.velocity: 500 is out of range; allowed: -100 to 100 m/s"),
         (lambda effect: effect.advance(float("nan")), "dt: NaN s is out of range; allowed: "),
         (lambda effect: effect.ignite("candle"), "there is no phenomenon `candle`; allowed: flame_sheet"),
-        (lambda effect: effect.set_camera(positoin=(0, 0, 0)), "unknown key `positoin`, did you mean `position`"),
+        (lambda effect: effect.set_camera(targets=(0, 0, 0)), "unknown key `targets`, did you mean `target`"),
         (lambda effect: effect.linear(np.zeros((3, 3, 4), np.float32)), r"an array of shape \[3, 3, 4\]; allowed: \(30, 40, 4\)"),
         (lambda effect: effect.linear(np.zeros((30, 40, 4), np.float64)), "out: an array of float64; allowed: float32"),
         (lambda effect: effect.aov("heat"), "no channel `heat`"),

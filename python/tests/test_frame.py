@@ -84,14 +84,14 @@ def test_frames_do_not_depend_on_threads_or_on_those_before(torch_scene):
 def test_arrays_outlive_their_shot(torch_scene):
     light = bansho.open(torch_scene).render(0).linear
     light += 1.0
-    assert light.flags.writeable and light.min() >= 1.0
+    assert light.flags["W"] and light.min() >= 1.0
 
 
 def test_linear_srgb_is_acescg_by_the_published_matrix(torch_scene):
     shot = bansho.open(torch_scene, space="linear_srgb")
     frame = shot.render(1)
     acescg = frame.in_space("acescg")
-    # ACEScg to linear sRGB with Bradford's adaptation, as colour-science prints it.
+    # ACEScg to linear sRGB with Bradford's adaptation.
     matrix = np.array([[1.70505, -0.62179, -0.08326], [-0.13026, 1.14080, -0.01055], [-0.02400, -0.12897, 1.15297]], np.float32)
     assert np.allclose(frame.linear[..., :3], acescg[..., :3] @ matrix.T, atol=1e-4 * acescg.max())
     assert np.array_equal(frame.linear[..., 3], acescg[..., 3])

@@ -23,8 +23,8 @@ def test_every_table_has_a_builder_that_explains_its_keys():
 
 
 def test_unknown_keys_are_refused_with_those_that_are_allowed():
-    with pytest.raises(TypeError, match="unknown key `widht`, did you mean `width`.*allowed: .*height"):
-        bansho.FlameSheet(widht=0.4)
+    with pytest.raises(TypeError, match="unknown key `heigth`, did you mean `height`.*allowed: .*width"):
+        bansho.FlameSheet(heigth=0.4)
     assert bansho.FlameSheet(width=0.4, height=None).to_dict() == {"width": 0.4}
 
 

@@ -152,7 +152,7 @@ class Effect:
             buffer = np.asarray(memoryview(out))
         if buffer.dtype != dtype:
             raise ValueError(f"out: an array of {buffer.dtype}; allowed: {np.dtype(dtype)}")
-        if not buffer.flags.writeable:
+        if not buffer.flags["W"]:
             raise ValueError("out: cannot be written; allowed: a writable array in main memory")
         return buffer
 
