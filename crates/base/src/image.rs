@@ -43,6 +43,12 @@ impl<const N: usize> Image<N> {
         &mut self.pixels
     }
 
+    /// All pixels, row after row, for whoever keeps them without the picture.
+    #[must_use]
+    pub fn into_pixels(self) -> Vec<[f32; N]> {
+        self.pixels
+    }
+
     /// One row, counted from the top.
     pub fn row(&self, y: usize) -> &[[f32; N]] {
         &self.pixels[y * self.width..][..self.width]
@@ -149,6 +155,14 @@ mod tests {
         let part = image.crop(Rect { x: 1, y: 1, width: 2, height: 2 }).unwrap();
         assert_eq!(part.pixels(), &[[5.0], [6.0], [9.0], [10.0]]);
         assert!(image.crop(Rect { x: 3, y: 0, width: 2, height: 1 }).is_none());
+    }
+
+    #[test]
+    fn the_pixels_outlive_their_picture_in_its_order() {
+        let pixels: Vec<[f32; 1]> = (0..6).map(|i| [i as f32]).collect();
+        let image = Image::from_pixels(3, 2, pixels.clone()).unwrap();
+        assert_eq!(image.at(0, 1), [3.0]);
+        assert_eq!(image.into_pixels(), pixels);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::{
     ops::Range,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError},
 };
 
 use bansho_base::{
@@ -171,9 +171,17 @@ impl PlateRows<'_> {
 }
 
 /// Light of an encoded value, by a table for the codes of 8 bits.
-fn decoded(value: f32) -> f32 {
-    let code = (value * 255.0 + 0.5) as u8;
-    if f32::from(code) / 255.0 == value { color::decode_srgb8(code) } else { color::decode_srgb(value) }
+#[inline]
+pub(crate) fn decoded(value: f32) -> f32 {
+    /// The value of each code, and its light: a comparison instead of a division, which is most of the time of a plate.
+    static CODES: LazyLock<[[f32; 2]; 256]> = LazyLock::new(|| {
+        std::array::from_fn(|code| {
+            let value = code as f32 / 255.0;
+            [value, color::decode_srgb(value)]
+        })
+    });
+    let [code_value, light] = CODES[usize::from((value * 255.0 + 0.5) as u8)];
+    if code_value == value { light } else { color::decode_srgb(value) }
 }
 
 /// Luminance of light, without negative values and what is not finite.

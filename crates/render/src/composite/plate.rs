@@ -1,6 +1,6 @@
 //! The plate of a frame, resampled to the picture: exposed colors, depth for occlusion, and surfaces for light.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
     camera::Camera,
@@ -10,7 +10,7 @@ use bansho_base::{
         parallel::prelude::*,
     },
     image::Image,
-    math::DVec2,
+    math::{DVec2, simd},
     parameters::BuildError,
 };
 
@@ -18,7 +18,7 @@ use super::{
     plate_mapping::{PlateMapping, depth_of_lens, filter_taps},
     plate_surface::{PlateSurface, SurfaceInputs},
 };
-use crate::plan::Plan;
+use crate::{plan::Plan, plate_boxes::decoded};
 use bansho_scene::{PlateDepth, PlatePictures};
 
 /// A plate, as large as the picture with its overscan.
@@ -66,25 +66,55 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
     let columns: Vec<_> = (0..mapping.picture[0]).map(|x| filter_taps(mapping, 0, x)).collect();
     let view = plan.view_transform();
     let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [0.0; 4]);
+    let covered = covered_columns(mapping);
     image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, row)| {
+        if !mapping.covers(1, y) {
+            return;
+        }
         let rows = filter_taps(mapping, 1, y);
-        for (x, pixel) in row.iter_mut().enumerate() {
-            if !(mapping.covers(0, x) && mapping.covers(1, y)) {
-                continue;
-            }
+        let row = &mut row[covered.clone()];
+        for (pixel, columns) in row.iter_mut().zip(&columns[covered.clone()]) {
             let mut sum = [0.0_f32; 4];
             for row in &rows {
-                for column in &columns[x] {
+                for column in columns {
                     let color = alpha.premultiplied(picture.color.at(column.pixel, row.pixel));
                     for c in 0..4 {
                         sum[c] += row.weight * column.weight * color[c];
                     }
                 }
             }
-            *pixel = over_black(&view, picture.encoding, alpha, sum);
+            *pixel = sum;
         }
+        row_over_black(&view, picture.encoding, alpha, row);
     });
     image
+}
+
+/// The columns of the picture that the plate covers.
+fn covered_columns(mapping: &PlateMapping) -> Range<usize> {
+    let covers = |x: &usize| mapping.covers(0, *x);
+    let first = (0..mapping.picture[0]).find(covers).unwrap_or(0);
+    first..(first..mapping.picture[0]).rfind(covers).map_or(first, |last| last + 1)
+}
+
+/// [`over_black`] for many pixels in place.
+fn row_over_black(view: &color::View, encoding: Encoding, alpha: PictureAlpha, row: &mut [[f32; 4]]) {
+    let is_straight_light = alpha == PictureAlpha::Straight(AlphaConvention::Linear);
+    if encoding != Encoding::DisplaySrgb || is_straight_light {
+        row.iter_mut().for_each(|pixel| *pixel = over_black(view, encoding, alpha, *pixel));
+        return;
+    }
+    // The inverse of the view takes longest, and is vectorized over the row.
+    for pixel in row.iter_mut() {
+        let [r, g, b, coverage] = *pixel;
+        let coverage = match alpha {
+            PictureAlpha::Opaque => 1.0,
+            PictureAlpha::Straight(_) => coverage_of_encoded_alpha([r, g, b], coverage.clamp(0.0, 1.0)),
+            PictureAlpha::Associated => coverage.clamp(0.0, 1.0),
+        };
+        *pixel = [decoded(r), decoded(g), decoded(b), coverage];
+    }
+    view.to_scene_row(simd::level(), row);
 }
 
 /// Exposed ACEScg of a pixel over black, and its coverage, from values multiplied by alpha.
@@ -145,18 +175,22 @@ fn to_scene(view: &color::View, encoding: Encoding, color: [f32; 3]) -> [f32; 3]
 fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &PlateMapping) -> Image<1> {
     let (values, [width, height]) = (depth.values(), depth.size);
     let per_plate_pixel = [width as f64 / mapping.plate[0] as f64, height as f64 / mapping.plate[1] as f64];
+    let nearest = |axis: usize, pixel: usize| {
+        let position = mapping.plate_position(axis, pixel) * per_plate_pixel[axis];
+        (position as usize).min(depth.size[axis] - 1)
+    };
+    let covered = covered_columns(mapping);
+    let columns: Vec<usize> = covered.clone().map(|x| nearest(0, x)).collect();
     let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [f32::INFINITY]);
     image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, row)| {
-        for (x, pixel) in row.iter_mut().enumerate() {
-            if mapping.covers(0, x) && mapping.covers(1, y) {
-                let [column, row] = [(0, x), (1, y)].map(|(axis, pixel)| {
-                    let position = mapping.plate_position(axis, pixel) * per_plate_pixel[axis];
-                    (position as usize).min(depth.size[axis] - 1)
-                });
-                let meters = depth.scale.meters_of(values[row * width + column]);
-                pixel[0] =
-                    depth_of_lens(camera, depth.scale.kind, meters, DVec2::new(x as f64 + 0.5, y as f64 + 0.5)) as f32;
-            }
+        if !mapping.covers(1, y) {
+            return;
+        }
+        let values = &values[nearest(1, y) * width..][..width];
+        for ((pixel, column), x) in row[covered.clone()].iter_mut().zip(&columns).zip(covered.clone()) {
+            let meters = depth.scale.meters_of(values[*column]);
+            pixel[0] =
+                depth_of_lens(camera, depth.scale.kind, meters, DVec2::new(x as f64 + 0.5, y as f64 + 0.5)) as f32;
         }
     });
     image
@@ -175,6 +209,36 @@ mod tests {
         // Half white is brighter there than its light alone could be: nothing is covered.
         assert!(coverage_of_encoded_alpha([0.5; 3], 0.5) < 1e-3);
         assert_eq!([0.0, 1.0].map(|alpha| coverage_of_encoded_alpha([0.0; 3], alpha)), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn rows_have_the_bits_of_single_pixels() {
+        let codes = (0..=255_u8).map(|code| f32::from(code) / 255.0);
+        // Codes of 8 bits are decoded by a table, values between them are not.
+        let pixels: Vec<[f32; 4]> =
+            codes.flat_map(|value| [[value, 0.7, 1.0 - value, 0.6], [0.37 * value, value, 0.123, value]]).collect();
+        for view in [color::View::DISPLAY, color::View::NEUTRAL, color::View::RAW] {
+            let view = view.with_white_balance(Some(4000.0));
+            for encoding in [Encoding::DisplaySrgb, Encoding::LinearSrgb, Encoding::LinearAcescg] {
+                for alpha in [
+                    PictureAlpha::Opaque,
+                    PictureAlpha::Associated,
+                    PictureAlpha::Straight(AlphaConvention::Encoded),
+                    PictureAlpha::Straight(AlphaConvention::Linear),
+                ] {
+                    let mut row = pixels.clone();
+                    row_over_black(&view, encoding, alpha, &mut row);
+                    for (drawn, pixel) in row.iter().zip(&pixels) {
+                        let expected = over_black(&view, encoding, alpha, *pixel);
+                        assert_eq!(
+                            drawn.map(f32::to_bits),
+                            expected.map(f32::to_bits),
+                            "{encoding:?} {alpha:?}: {pixel:?}"
+                        );
+                    }
+                }
+            }
+        }
     }
 
     #[test]

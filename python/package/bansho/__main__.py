@@ -1,0 +1,36 @@
+"""`python -m bansho` is the program `bansho`, whose binary lies among the scripts of the wheel."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+
+def program() -> Path:
+    """The binary of the program: beside Python's scripts, else on the path."""
+    name = "bansho.exe" if os.name == "nt" else "bansho"
+    schemes = {sysconfig.get_path("scripts"), sysconfig.get_path("scripts", f"{os.name}_user")}
+    for folder in (path for path in schemes if path):
+        if (binary := Path(folder) / name).is_file():
+            return binary
+    found = shutil.which("bansho")
+    if found is None:
+        raise SystemExit("bansho: the program is not installed with this package; install a wheel that has it, or the program itself")
+    return Path(found)
+
+
+def main() -> int:
+    """Runs the program with the arguments of Python."""
+    command = [str(program()), *sys.argv[1:]]
+    if os.name == "nt":
+        return subprocess.call(command)
+    os.execv(command[0], command)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,141 @@
+"""Augmentation in the style of albumentations: callables that take and return named arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import weather
+
+__all__ = ["Fog", "Rain"]
+
+Interval = float | tuple[float, float]
+
+
+def _interval(value: Any, name: str) -> tuple[float, float]:
+    """A number, or the ends of an interval."""
+    low, high = (value, value) if np.isscalar(value) else value
+    if not (np.isfinite(low) and np.isfinite(high) and low <= high):
+        raise ValueError(f"{name}: {value!r}; allowed: a number, or (low, high)")
+    return float(low), float(high)
+
+
+class _Transform:
+    """A transform that is applied with a probability. Its random numbers follow from `seed` and the number of the call, or from `rng` of the call."""
+
+    def __init__(self, p: float, seed: int) -> None:
+        if not 0 <= p <= 1:
+            raise ValueError(f"p: {p!r}; allowed: 0 to 1")
+        self.p = p
+        self.seed = seed
+        self._calls = 0
+
+    def _generator(self, rng: np.random.Generator | None) -> np.random.Generator:
+        if rng is not None:
+            return rng
+        self._calls += 1
+        return np.random.default_rng([self.seed, self._calls - 1])
+
+    def __call__(self, *, image: Any, depth: Any = None, rng: np.random.Generator | None = None, **others: Any) -> dict[str, Any]:
+        """The transformed `image`; everything else unchanged. `rng` makes a call reproducible, whatever was called before."""
+        generator = self._generator(rng)
+        if generator.random() < self.p:
+            image = self.apply(image, depth, generator)
+        result = {"image": image, **others}
+        if depth is not None:
+            result["depth"] = depth
+        return result
+
+    def apply(self, image: Any, depth: Any, generator: np.random.Generator) -> Any:
+        """The image with weather, whose parameters are drawn from the generator."""
+        raise NotImplementedError
+
+    def as_albumentations(self) -> Any:
+        """This transform as one of albumentations, for `albumentations.Compose`: `compose(image=image, depth=depth)`."""
+        import albumentations
+
+        transform = self
+
+        class OfBansho(albumentations.ImageOnlyTransform):
+            """A transform of Bansho within albumentations."""
+
+            @property
+            def targets_as_params(self) -> list[str]:
+                return []
+
+            def get_params_dependent_on_data(self, params: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
+                return {"depth": data.get("depth"), "word": self.py_random.getrandbits(63)}
+
+            def apply(self, img: Any, depth: Any = None, word: int = 0, **params: Any) -> Any:
+                return transform.apply(img, depth, np.random.default_rng(word))
+
+            def get_transform_init_args_names(self) -> tuple[str, ...]:
+                return ()
+
+        return OfBansho(p=self.p)
+
+
+class Rain(_Transform):
+    """Rain whose rate, wind and drops are random.
+
+    >>> transform = bansho.transforms.Rain(rate_mm_per_h=(5, 50))
+    >>> rainy = transform(image=image, depth=depth)["image"]
+    """
+
+    def __init__(
+        self,
+        rate_mm_per_h: Interval = (5.0, 50.0),
+        *,
+        wind_speed: Interval = (0.0, 5.0),
+        exposure_s: Interval = (1 / 120, 1 / 30),
+        visibility: str | None = "augment",
+        strength: float | str | None = None,
+        p: float = 1.0,
+        seed: int = 0,
+        **options: Any,
+    ) -> None:
+        """Intervals are (low, high), of which a value is drawn evenly; of the rate, whose logarithm is. `options` are those of `bansho.rain`.
+
+        `visibility="augment"` is the default here, since physical rain by day is hardly seen; pass `visibility="physical"` for that.
+        """
+        super().__init__(p, seed)
+        self.rate_mm_per_h = _interval(rate_mm_per_h, "rate_mm_per_h")
+        if self.rate_mm_per_h[0] <= 0:
+            raise ValueError(f"rate_mm_per_h: {rate_mm_per_h!r}; allowed: rates above 0")
+        self.wind_speed = _interval(wind_speed, "wind_speed")
+        self.exposure_s = _interval(exposure_s, "exposure_s")
+        self.options = {"visibility": visibility if strength is None else None, "strength": strength, **options}
+
+    def parameters(self, generator: np.random.Generator) -> dict[str, Any]:
+        """What `bansho.rain` is called with: drawn from the generator, always in the same order."""
+        low, high = np.log(self.rate_mm_per_h)
+        rate = float(np.exp(generator.uniform(low, high)))
+        speed, direction = generator.uniform(*self.wind_speed), generator.uniform(0, 2 * np.pi)
+        return {
+            "rate_mm_per_h": min(max(rate, self.rate_mm_per_h[0]), self.rate_mm_per_h[1]),
+            "wind": (float(speed * np.cos(direction)), 0.0, float(speed * np.sin(direction))),
+            "exposure_s": float(generator.uniform(*self.exposure_s)),
+            "seed": int(generator.integers(0, 2**52)),
+        }
+
+    def apply(self, image: Any, depth: Any, generator: np.random.Generator) -> Any:
+        """The image with rain."""
+        return weather.rain(image, depth, **{**self.options, **self.parameters(generator)})
+
+
+class Fog(_Transform):
+    """Fog of a random visibility; it needs the depth of the image."""
+
+    def __init__(self, visibility_m: Interval = (50.0, 1000.0), *, p: float = 1.0, seed: int = 0, **options: Any) -> None:
+        """The logarithm of the visibility is drawn evenly. `options` are those of `bansho.fog`."""
+        super().__init__(p, seed)
+        self.visibility_m = _interval(visibility_m, "visibility_m")
+        if self.visibility_m[0] <= 0:
+            raise ValueError(f"visibility_m: {visibility_m!r}; allowed: distances above 0")
+        self.options = options
+
+    def apply(self, image: Any, depth: Any, generator: np.random.Generator) -> Any:
+        """The image in fog."""
+        low, high = np.log(self.visibility_m)
+        return weather.fog(image, depth, float(np.exp(generator.uniform(low, high))), **self.options)
