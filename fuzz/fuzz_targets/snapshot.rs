@@ -26,6 +26,7 @@ use bansho_render::{CompiledScene, Plan, PlanOptions, Shot};
 use bansho_fuzz::one_thread;
 
 const GAS: &str = "bansho = 2\n[picture]\nsize = [8, 6]\n[[flame_particles]]\nparticles = 60\npreroll_s = 0.0\n";
+const VOLUME: &str = "bansho = 2\n[picture]\nsize = [8, 6]\n[[flame_volume]]\nresolution = 6\npreroll_s = 0.0\n";
 const AURORA: &str = "bansho = 2\n[picture]\nsize = [8, 6]\n[[aurora]]\npreroll_s = 0.0\nparticles = { count = 100 }\nfield = { cells = 16 }\n";
 
 /// Bytes before the state of the first phenomenon: magic, version, key, number of phenomena.
@@ -60,15 +61,15 @@ thread_local! {
     static SCENES: RefCell<Vec<Restored>> = RefCell::new(COMPILED.iter().map(open).collect());
 }
 
-static COMPILED: LazyLock<[Arc<CompiledScene>; 2]> = LazyLock::new(|| {
+static COMPILED: LazyLock<[Arc<CompiledScene>; 3]> = LazyLock::new(|| {
     one_thread();
-    [compiled(GAS), compiled(AURORA)]
+    [compiled(GAS), compiled(AURORA), compiled(VOLUME)]
 });
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let Some((&first, rest)) = bytes.split_first() else { return };
     SCENES.with_borrow_mut(|scenes| {
-        let Restored { shot, header, run } = &mut scenes[usize::from(first & 1)];
+        let Restored { shot, header, run } = &mut scenes[usize::from(first % 3)];
         let digest = blake3::hash(bytes).as_bytes()[0];
         if digest <= AS_IT_IS {
             if shot.restore(rest).is_ok() {

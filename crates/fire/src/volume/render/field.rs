@@ -12,6 +12,9 @@ pub(crate) const BLOCK: usize = 8;
 /// the inverse of the slope of the mixture fraction across it, so that splines with jumps of curvature show the cells as fine lines.
 const QUARTER: [f32; 4] = [0.070_312_5, 0.611_979_2, 0.315_104_2, 0.002_604_2];
 
+/// Largest speed of gas that is drawn, m/s.
+const FASTEST: f32 = 1e3;
+
 /// What a ray reads at a point besides the mixture fraction: velocity, m/s, and deficit of heat, K.
 pub(crate) type PointData = [f32; 4];
 
@@ -265,8 +268,10 @@ fn point_data(flow: &Flow, active: &ActiveRows) -> Vec<PointData> {
         for (z, row) in grid.rows(y) {
             for x in active.row(y, z) {
                 let index = row + x;
-                let speed =
-                    |axis: usize| 0.5 * (flow.velocity[axis][index] + flow.velocity[axis][index + strides[axis]]);
+                let speed = |axis: usize| {
+                    let mean = 0.5 * (flow.velocity[axis][index] + flow.velocity[axis][index + strides[axis]]);
+                    if mean.abs() <= FASTEST { mean } else { 0.0 }
+                };
                 data[z * width + x] = [speed(0), speed(1), speed(2), flow.contents.quantities[1][index]];
             }
         }

@@ -33,6 +33,8 @@ const COURANT: f32 = 0.8;
 const MAX_STEPS: usize = 400;
 /// Largest change of volume in one step.
 const MAX_EXPANSION: f32 = 0.4;
+/// Densities that gas may have, kg/m^3. Whatever a wind of absurd strength leaves in a cell besides becomes air.
+const VALID_DENSITIES: std::ops::Range<f32> = 1e-3..1e3;
 /// Mixture fraction below which gas is air.
 const LEAST_MIXTURE: f32 = 2e-4;
 /// Cells around gas into which it may flow in a step.
@@ -250,7 +252,10 @@ impl Simulation {
                 for (z, row) in grid.rows(y) {
                     for x in active.row(y, z) {
                         let at = row + x - padded_y * plane;
-                        if solids.contains(row + x) {
+                        let is_gas = VALID_DENSITIES.contains(&density[at])
+                            && mixture[at].is_finite()
+                            && deficit[at].is_finite();
+                        if solids.contains(row + x) || !is_gas {
                             (density[at], mixture[at], deficit[at]) = (constants.mixture.air_density, 0.0, 0.0);
                             continue;
                         }

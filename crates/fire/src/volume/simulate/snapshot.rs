@@ -8,7 +8,7 @@ const VERSION: u32 = 1;
 /// Numbers before the fields.
 const HEAD: usize = 4;
 /// Larger than any value of a simulated field, and small enough that computations do not overflow.
-const MAX_MAGNITUDE: f32 = 1e9;
+const MAX_MAGNITUDE: f32 = 1e7;
 
 /// The state at a time; without gas before the first step.
 pub(crate) fn write(time: f64, simulation: Option<&Simulation>) -> Vec<u8> {
@@ -74,7 +74,12 @@ pub(crate) fn read(
             *value = next()?;
         }
     }
-    if simulation.flow.contents.density.iter().any(|density| *density <= 0.0) || values.next().is_some() {
+    let contents = &simulation.flow.contents;
+    let are_densities_valid = contents.density.iter().all(|density| (1e-4..1e4).contains(density));
+    let [mixture, deficit] = &contents.quantities;
+    let are_mixtures_valid = mixture.iter().all(|mixture| (-0.01..=1.01).contains(mixture));
+    let are_deficits_valid = deficit.iter().all(|deficit| (-1.0..=1e4).contains(deficit));
+    if !(are_densities_valid && are_mixtures_valid && are_deficits_valid) || values.next().is_some() {
         return Err(SnapshotError::Damaged);
     }
     simulation.restore_active();
