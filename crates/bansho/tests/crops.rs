@@ -79,6 +79,15 @@ fn of_particle_flames() {
 }
 
 #[test]
+fn of_volume_flames() {
+    let fire = "[[flame_volume]]\nresolution = 14\npreroll_s = 0.6\n";
+    assert_parts_agree(&format!("bansho = 2\n{fire}[sky]\n[ground]\n"), 4);
+    let smoke = "fuel = \"heptane\"\n[[obstacle]]\nvisible = true\nposition = [0, 0.4, 0]\n[[light]]\n";
+    assert_parts_agree(&format!("bansho = 2\n{fire}{smoke}"), 4);
+    assert_parts_agree(&format!("bansho = 2\n[camera]\nlens = \"fisheye\"\nposition = [0, 0.5, 1.2]\n{fire}"), 4);
+}
+
+#[test]
 fn of_rain_among_lamps_over_wet_ground() {
     assert_parts_agree("bansho = 2\n[[rain]]\n", 3);
     assert_parts_agree("bansho = 2\n[[rain]]\nmethod = \"billboards\"\n[camera]\nlens = \"fisheye\"\n", 3);

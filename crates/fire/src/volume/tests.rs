@@ -60,11 +60,12 @@ fn run(parameters: FlameVolumeParameters) -> FlameVolumeRun {
     FlameVolumeRun::new(Arc::new(flame))
 }
 
-/// A series of a fire: its height, m, and the speed on its axis at a height of half the diameter, m/s, at every state.
+/// A series of a fire: its height, m, and the volume of hot gas that rises through a layer half a diameter above the burner, over the area of a cell, m/s, at every
+/// state.
 struct Series {
     step_s: f64,
     heights: Vec<f64>,
-    speeds: Vec<f64>,
+    flows: Vec<f64>,
     radiated_share: f64,
 }
 
@@ -72,19 +73,20 @@ impl Series {
     fn new(simulation: &mut Simulation, seconds: f64, surroundings: &Surroundings) -> Self {
         let (step_s, size) = (simulation.shared.parameters.step_s, simulation.shared.size);
         let grid = simulation.flow.grid;
-        let place = grid.point_in_cells(DVec3::Y * (0.5 * size.diameter));
-        let probe = grid.index(place.to_array().map(|value| value as usize));
-        let (mut heights, mut speeds, mut radiated) = (Vec::new(), Vec::new(), 0.0);
+        let layer = grid.point_in_cells(DVec3::Y * (0.5 * size.diameter)).y as usize;
+        let (mut heights, mut flows, mut radiated) = (Vec::new(), Vec::new(), 0.0);
         for number in 0..(seconds / step_s) as usize {
             simulation.step(number as f64 * step_s, surroundings);
             heights.push(simulation.figures.height);
-            speeds.push(f64::from(simulation.flow.velocity[1][probe]));
+            let cells = grid.rows(layer).flat_map(|(_, row)| row..row + grid.size[0]);
+            let hot = cells.filter(|index| simulation.flow.contents.quantities[0][*index] > 0.01);
+            flows.push(hot.map(|index| f64::from(simulation.flow.velocity[1][index])).sum());
             radiated += simulation.figures.radiated_kw / simulation.figures.heat_release_kw;
         }
         // The fire develops in the first third.
         let first = heights.len() / 3;
         let radiated_share = radiated / heights.len() as f64;
-        Self { step_s, heights: heights.split_off(first), speeds: speeds.split_off(first), radiated_share }
+        Self { step_s, heights: heights.split_off(first), flows: flows.split_off(first), radiated_share }
     }
 
     /// Height that is exceeded half of the time, m.
@@ -94,17 +96,16 @@ impl Series {
         sorted[sorted.len() / 2]
     }
 
-    /// Frequency of puffing, Hz: that of the first maximum of the autocorrelation of the speed.
+    /// Frequency of puffing, Hz: that of the largest maximum of the autocorrelation of the flow after its first fall below 0.
     fn puffing_hz(&self) -> f64 {
-        let mean = self.speeds.iter().sum::<f64>() / self.speeds.len() as f64;
-        let deviations: Vec<f64> = self.speeds.iter().map(|speed| speed - mean).collect();
+        let mean = self.flows.iter().sum::<f64>() / self.flows.len() as f64;
+        let deviations: Vec<f64> = self.flows.iter().map(|flow| flow - mean).collect();
         let correlation = |lag: usize| {
             let pairs = deviations.iter().zip(&deviations[lag..]);
             pairs.map(|(a, b)| a * b).sum::<f64>() / (deviations.len() - lag) as f64
         };
-        let longest = (1.6 / self.step_s) as usize;
+        let longest = (1.0 / self.step_s) as usize;
         let correlations: Vec<f64> = (0..longest.min(deviations.len() - 1)).map(correlation).collect();
-        // After it has fallen below 0 for the first time, the largest value.
         let below = correlations.iter().position(|value| *value < 0.0).unwrap_or(1);
         let peak =
             (below..correlations.len()).max_by(|a, b| correlations[*a].total_cmp(&correlations[*b])).unwrap_or(1);
@@ -241,22 +242,24 @@ fn a_fire_shines_on_what_is_around_it() {
     assert!(heights.is_sorted() && heights[0] > 0.0 && heights[2] < 1.5, "{heights:?}");
 }
 
-/// Published fires: fuel, diameter in m, heat release rate in kW, puffing in Hz, height in m (MaCFP database, NIST pool fires and burners).
-const MEASURED: [(Fuel, f64, f64, f64, f64); 5] = [
-    (Fuel::Methanol, 0.301, 19.2, 2.7, 0.41),
-    (Fuel::Heptane, 0.301, 116.0, 2.8, 1.32),
+/// Published fires: fuel, diameter in m, heat release rate in kW, puffing in Hz, height in m (MaCFP database, NIST pool fires and burners). The rate of the fire of a
+/// meter is not stated there: 256 kW is that of the mass flux of methanol in pools of this size.
+const MEASURED: [(Fuel, f64, f64, f64, f64); 6] = [
     (Fuel::Propane, 0.37, 20.7, 2.2, 0.53),
     (Fuel::Propane, 0.37, 34.4, 2.4, 0.75),
     (Fuel::Propane, 0.37, 50.1, 2.4, 0.96),
+    (Fuel::Methanol, 0.301, 19.2, 2.7, 0.41),
+    (Fuel::Methanol, 1.006, 256.0, 1.4, 1.23),
+    (Fuel::Heptane, 0.301, 116.0, 2.8, 1.32),
 ];
 
 #[test]
-#[ignore = "takes a quarter of an hour: five fires of 20 s"]
+#[ignore = "takes ten minutes: six fires of 15 s"]
 fn fires_puff_and_are_as_tall_as_measured() {
     let wind = still_air();
     for (fuel, diameter, kilowatts, hertz, height) in MEASURED {
-        let mut simulation = simulation(fire(fuel, diameter, kilowatts, 15.0), 1);
-        let series = Series::new(&mut simulation, 20.0, &Surroundings::from_wind(&wind));
+        let mut simulation = simulation(fire(fuel, diameter, kilowatts, 12.0), 1);
+        let series = Series::new(&mut simulation, 15.0, &Surroundings::from_wind(&wind));
         println!(
             "{} of {:.1} cm, {kilowatts} kW: puffing {:.2} Hz ({hertz}), height {:.2} m ({height}), radiated {:.2}",
             fuel.name(),
@@ -265,5 +268,7 @@ fn fires_puff_and_are_as_tall_as_measured() {
             series.height(),
             series.radiated_share
         );
+        let ratios = [series.puffing_hz() / hertz, series.height() / height];
+        assert!(ratios.iter().all(|ratio| (0.6..1.5).contains(ratio)), "{ratios:?} of what was measured");
     }
 }

@@ -33,15 +33,18 @@ pub(crate) struct Refraction<'a> {
 impl HeatHaze {
     /// The deflection in `rect` of a picture; `None` if there is none.
     pub(crate) fn new(refraction: &Refraction, view: &View, rect: Rect) -> Option<Self> {
-        let (columns, rows) = (rect.width.div_ceil(CELL) + 3, rect.height.div_ceil(CELL) + 3);
+        // Cells are those of the whole picture, so that a crop has the same.
+        let (first_column, first_row) = (rect.x / CELL, rect.y / CELL);
+        let columns = rect.right().div_ceil(CELL) - first_column + 3;
+        let rows = rect.bottom().div_ceil(CELL) - first_row + 3;
         if refraction.gain <= 0.0 || rect.is_empty() {
             return None;
         }
         let paths: Vec<f32> = (0..columns * rows)
             .into_par_iter()
             .map(|index| {
-                let place = |cell: usize, start: usize| start as f64 + (cell as f64 - 1.0) * CELL as f64;
-                let pixel = DVec2::new(place(index % columns, rect.x), place(index / columns, rect.y));
+                let place = |cell: usize, first: usize| ((first + cell) as f64 - 1.0) * CELL as f64;
+                let pixel = DVec2::new(place(index % columns, first_column), place(index / columns, first_row));
                 refraction.path_pixels(view, pixel)
             })
             .collect();
@@ -51,8 +54,8 @@ impl HeatHaze {
         let mut angle = Image::filled(rect.width, rect.height, [0.0; 2]);
         angle.pixels_mut().par_chunks_mut(rect.width).enumerate().for_each(|(y, angles)| {
             for (x, angle) in angles.iter_mut().enumerate() {
-                let (column, across) = cell_of(x);
-                let (row, down) = cell_of(y);
+                let (column, across) = cell_of(rect.x + x - first_column * CELL);
+                let (row, down) = cell_of(rect.y + y - first_row * CELL);
                 // Values and slopes of the quadratic B-spline of three cells.
                 let [values_x, values_y] = [across, down].map(spline);
                 let [slopes_x, slopes_y] = [across, down].map(spline_slope);

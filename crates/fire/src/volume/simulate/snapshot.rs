@@ -63,7 +63,7 @@ pub(crate) fn read(
         .find(|simulation| HEAD + simulation.flow.state().map(Vec::len).sum::<usize>() == count)
         .ok_or(SnapshotError::Damaged)?;
     let factor = next()?;
-    if !(0.0..=100.0).contains(&factor) {
+    if !(0.0..=1000.0).contains(&factor) {
         return Err(SnapshotError::Damaged);
     }
     let velocity = [next()?, next()?, next()?];
