@@ -35,6 +35,8 @@ pub struct Aurora {
     render_tables: OnceLock<RenderTables>,
     /// Luminance of the brightest column of all shapes, cd/m^2.
     pub(super) max_column_luminance: f64,
+    /// Memory of the lists of neighbors of all particles, bytes.
+    pub(super) neighbor_list_bytes: f64,
     /// The first shape, counted from 0, whose transition has sheets that cross.
     pub(super) crossing: Option<usize>,
     /// In a loop, duration of the crossfade from one run to the next, s.
@@ -86,7 +88,7 @@ impl Aurora {
         check_color_matching(&parameters)?;
         check_sampling(&parameters)?;
         let lengths = sequence.arrivals().iter().map(|time| sequence.at(*time).length());
-        check_neighbors(&parameters, lengths.fold(f64::INFINITY, f64::min))?;
+        let neighbor_list_bytes = check_neighbors(&parameters, lengths.fold(f64::INFINITY, f64::min))?;
         let crossing = sequence.crossing();
         let factors: Vec<[f64; 2]> = sequence.factors().collect();
         let emission = parameters.rendering.emission(parameters.spectrum);
@@ -95,6 +97,7 @@ impl Aurora {
             seed,
             max_column_luminance: max_column_luminance(&parameters, &emission, &factors),
             emission,
+            neighbor_list_bytes,
             initial_state: OnceLock::new(),
             render_tables: OnceLock::new(),
             parameters,

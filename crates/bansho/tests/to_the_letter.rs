@@ -11,7 +11,7 @@ use std::{
 use bansho::{
     KINDS, Scene,
     base::{
-        parameters::{Parameters, Table, Value},
+        parameters::{Parameters, Value},
         tables::PaperSettings,
     },
     scene::parse_values,
@@ -113,23 +113,13 @@ fn assignments(paper: &Paper) -> Vec<(String, String)> {
 /// The value of a key of a scene, in the tables of a kind or in `[picture]` and `[camera]`.
 fn stated(scene: &Scene, kind: &str, key: &str) -> Vec<Option<Value>> {
     if let Some(key) = key.strip_prefix("picture.") {
-        return vec![value_at(&scene.picture.to_table(), key)];
+        return vec![scene.picture.to_table().at_path(key).cloned()];
     }
     if let Some(key) = key.strip_prefix("camera.") {
-        return vec![value_at(&scene.camera.to_table(), key)];
+        return vec![scene.camera.to_table().at_path(key).cloned()];
     }
     let tables = scene.instances.iter().filter(|instance| instance.kind.key == kind);
-    tables.map(|instance| value_at(&instance.parameters.canonical(), key)).collect()
-}
-
-fn value_at(table: &Table, key: &str) -> Option<Value> {
-    match key.split_once('.') {
-        None => table.get(key).map(|node| node.value.clone()),
-        Some((first, rest)) => match &table.get(first)?.value {
-            Value::Table(inner) => value_at(inner, rest),
-            _ => None,
-        },
-    }
+    tables.map(|instance| instance.parameters.canonical().at_path(key).cloned()).collect()
 }
 
 fn agree(a: &Value, b: &Value) -> bool {
@@ -187,11 +177,11 @@ fn a_departure_tells_the_value_and_that_of_the_paper() {
     let departures = bansho::parse_scene("rain", text).unwrap().paper_departures();
     let texts: Vec<String> = departures.iter().map(ToString::to_string).collect();
     assert!(texts.iter().any(|text| {
-        text == "rain.0.method = \"billboards\"; Yoshida, Dobashi & Yamamoto: \"textures\" (section 5.1)"
+        text == "Yoshida, Dobashi & Yamamoto, section 5.1: rain.0.method = \"textures\", here \"billboards\""
     }));
     // The keys of the scene once, and none of a phenomenon that is not drawn.
-    assert!(texts.iter().filter(|text| text.starts_with("picture.view = ")).count() == 1, "{texts:?}");
-    assert!(!texts.iter().any(|text| text.starts_with("rain.1")), "{texts:?}");
+    assert!(texts.iter().filter(|text| text.contains(": picture.view = ")).count() == 1, "{texts:?}");
+    assert!(!texts.iter().any(|text| text.contains("rain.1")), "{texts:?}");
     let sky = bansho::parse_scene("sky", "bansho = 2\n[sky]\n").unwrap();
     assert!(sky.paper_departures().is_empty());
 }

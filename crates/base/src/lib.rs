@@ -9,6 +9,7 @@ pub mod geometry;
 pub mod host;
 pub mod image;
 pub mod math;
+pub mod measured;
 pub mod noise;
 pub mod parameters;
 pub mod phenomenon;

@@ -1,7 +1,7 @@
 //! In what a scene departs from the papers of its phenomena.
 
 use bansho_base::{
-    parameters::{Parameters, Table, Value},
+    parameters::{Node, Parameters, Table, Value},
     tables::PaperSetting,
 };
 
@@ -9,11 +9,11 @@ use crate::{Scene, parse_values};
 
 /// A value that is not that of the paper.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{path} = {value}; {paper}: {allowed} ({source_in_paper})")]
+#[error("{paper}, {source_in_paper}: {path} = {allowed}, here {value}")]
 pub struct PaperDeparture {
     /// Path of the key in the scene.
     pub path: String,
-    /// Its value, in the syntax of scene files; "none" where it has none.
+    /// Its value, in the syntax of scene files; "none" where it has none. Long lists and tables are described instead.
     pub value: String,
     /// Authors of the paper.
     pub paper: &'static str,
@@ -67,12 +67,12 @@ impl Scene {
 
 /// Path and value of a key whose value in `table` is not allowed.
 fn departure<'a>(table: &Table, setting: &'a PaperSetting, prefix: &str) -> Option<(String, String, &'a PaperSetting)> {
-    let value = value_at(table, setting.key);
+    let value = table.at_path(setting.key);
     let is_allowed = setting.allowed.iter().any(|allowed| match (value, parse(allowed)) {
         (Some(value), Some(allowed)) => is_same(value, &allowed),
         (value, allowed) => value.is_none() && allowed.is_none(),
     });
-    let text = || value.map_or("none".to_owned(), Value::to_string);
+    let text = || value.map_or("none".to_owned(), short_text);
     (!is_allowed).then(|| (format!("{prefix}{}", setting.key), text(), setting))
 }
 
@@ -85,13 +85,19 @@ fn parse(text: &str) -> Option<Value> {
     table.get("value").map(|node| node.value.clone())
 }
 
-fn value_at<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
-    match key.split_once('.') {
-        None => table.get(key).map(|node| &node.value),
-        Some((first, rest)) => match &table.get(first)?.value {
-            Value::Table(inner) => value_at(inner, rest),
-            _ => None,
-        },
+/// Lists and tables with longer texts are described.
+const MAX_CHARACTERS: usize = 48;
+
+/// A value in the syntax of scene files. Of a long one that has parts, what it is: "a curve of 5 points".
+fn short_text(value: &Value) -> String {
+    let text = value.to_string();
+    let is_list = |node: &Node| matches!(node.value, Value::List(_));
+    match value {
+        _ if text.chars().count() <= MAX_CHARACTERS => text,
+        Value::List(items) if items.iter().all(is_list) => format!("a curve of {} points", items.len()),
+        Value::List(items) => format!("a list of {}", items.len()),
+        Value::Table(table) => format!("a table of {} keys", table.entries.len()),
+        _ => text,
     }
 }
 
@@ -103,5 +109,25 @@ fn is_same(a: &Value, b: &Value) -> bool {
         }
         (Value::Integer(_) | Value::Number(_), Value::Integer(_) | Value::Number(_)) => a.as_number() == b.as_number(),
         _ => a == b,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(value: &str) -> String {
+        short_text(&parse(value).unwrap())
+    }
+
+    #[test]
+    fn long_values_are_described() {
+        assert_eq!(text("[[0.0, 0.0], [1.0, 0.5]]"), "[[0.0, 0.0], [1.0, 0.5]]");
+        assert_eq!(text("[[0.0, 0.0], [0.25, 0.5], [0.5, 1.0], [0.75, 1.5], [1.0, 0.0]]"), "a curve of 5 points");
+        assert_eq!(text(&format!("[{}]", ["1.25"; 20].join(", "))), "a list of 20");
+        assert_eq!(text("{ first = [1.0, 2.0, 3.0, 4.0], second = [1.0, 2.0, 3.0, 4.0] }"), "a table of 2 keys");
+        // A text has no parts.
+        let path = format!("\"{}\"", "a".repeat(100));
+        assert_eq!(text(&path), path);
     }
 }

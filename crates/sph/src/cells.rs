@@ -106,21 +106,7 @@ impl<const D: usize> Cells<D> {
     /// # Panics
     /// If there are more than 2^27 particles, or `positions` and `ids` differ in length.
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
-        assert!(ids.len() <= 1 << 27, "particles are counted in 32 bits");
-        assert!(positions.iter().all(|component| component.len() == ids.len()), "one position per id");
-        let scale = 1.0 / (self.support_radius * CELL_SIZE_MARGIN);
-        let mut bounds = [[0; 2]; D];
-        let axes = self.coordinates.par_iter_mut().zip(positions).zip(&mut bounds);
-        axes.enumerate().for_each(|(c, ((cells, component), bounds))| {
-            let along = if c == 0 { CELLS_PER_RADIUS_X } else { 1 };
-            let (scale, max_coordinate) = (scale * along as f32, (MAX_CELL_COORDINATE * along) as f32);
-            dispatch!(bansho_base::math::simd::level(), _simd => *bounds = cell_coordinates(component, scale, max_coordinate, cells));
-        });
-        self.order.clear();
-        self.occupied.clear();
-        if !ids.is_empty() {
-            self.sort(ids, &bounds);
-        }
+        self.sort_by_cell(positions, ids);
         let mut sorted = std::mem::replace(&mut self.positions, [const { Vec::new() }; D]);
         sorted.par_iter_mut().zip(positions).for_each(|(to, from)| {
             to.clear();
@@ -141,8 +127,39 @@ impl<const D: usize> Cells<D> {
         );
     }
 
+    /// As [`Cells::assign`] without candidate neighbors, which take most of its time and memory: for [`Cells::reorder`] and [`Cells::reorder_all`] where
+    /// neighbors are found in another way. Until the next [`Cells::assign`], there are no particles in sums.
+    ///
+    /// # Panics
+    /// If there are more than 2^27 particles, or `positions` and `ids` differ in length.
+    pub fn sort(&mut self, positions: [&[f32]; D], ids: &[u64]) {
+        self.sort_by_cell(positions, ids);
+        self.positions.iter_mut().for_each(Vec::clear);
+        self.ids.clear();
+        self.batches.clear();
+    }
+
+    /// Determines the order and the occupied cells.
+    fn sort_by_cell(&mut self, positions: [&[f32]; D], ids: &[u64]) {
+        assert!(ids.len() <= 1 << 27, "particles are counted in 32 bits");
+        assert!(positions.iter().all(|component| component.len() == ids.len()), "one position per id");
+        let scale = 1.0 / (self.support_radius * CELL_SIZE_MARGIN);
+        let mut bounds = [[0; 2]; D];
+        let axes = self.coordinates.par_iter_mut().zip(positions).zip(&mut bounds);
+        axes.enumerate().for_each(|(c, ((cells, component), bounds))| {
+            let along = if c == 0 { CELLS_PER_RADIUS_X } else { 1 };
+            let (scale, max_coordinate) = (scale * along as f32, (MAX_CELL_COORDINATE * along) as f32);
+            dispatch!(bansho_base::math::simd::level(), _simd => *bounds = cell_coordinates(component, scale, max_coordinate, cells));
+        });
+        self.order.clear();
+        self.occupied.clear();
+        if !ids.is_empty() {
+            self.sort_by_key(ids, &bounds);
+        }
+    }
+
     /// Sorts by key, then by id, and lists the occupied cells; `bounds` are the first and last cell along each axis.
-    fn sort(&mut self, ids: &[u64], bounds: &[[i32; 2]; D]) {
+    fn sort_by_key(&mut self, ids: &[u64], bounds: &[[i32; 2]; D]) {
         let Self { coordinates, sorting, order, occupied, .. } = self;
         let keys = Keys::new(bounds.map(|[first, _]| first), bounds.map(|[_, last]| last));
         sorting.sort(|index| keys.key(coordinates, index), keys.bits, ids, order, occupied);

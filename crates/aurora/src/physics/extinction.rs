@@ -119,6 +119,8 @@ impl AttenuationByDistance {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::assert_measured;
+
     use super::*;
 
     #[test]
@@ -163,7 +165,8 @@ mod tests {
         let level = (0..).find(|level| level_altitude_km(*level) >= 100.0).unwrap();
         let [up, across] = [attenuation.of_level(level), f64::from(attenuation.of_field_line([180.0, 240.0]))];
         assert!((up - 0.990_050).abs() < 1e-6 && (across - 0.913_931).abs() < 1e-6, "{up} {across}");
-        // The distance is the hypotenuse: exp(-0.1).
+        // The distance is the hypotenuse, 316 km: exp(-0.1).
+        assert_measured!("distance, km", math::hypot(100.0, math::hypot(180.0, 240.0)), 316.0, 0.5);
         assert!((up * across - 0.904_837).abs() < 1e-6);
         assert_eq!(AttenuationByDistance::default().of_level(level), 1.0);
     }

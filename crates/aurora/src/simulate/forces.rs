@@ -52,15 +52,18 @@ impl Support {
     }
 }
 
-/// Maximum number of pairs of neighbors. Lists of candidates take half a byte for each of them.
+/// Maximum number of pairs of neighbors.
 const MAX_PAIRS: f64 = 1.5e9;
+/// Memory of the lists of candidates for each pair of neighbors, bytes: eight particles share a list.
+const PAIR_BYTES: f64 = 0.6;
 
-/// Checks the number of neighbors of the particles of a sheet of that length in km, the shortest of a sequence.
+/// Checks the number of neighbors of the particles of a sheet of that length in km, the shortest of a sequence, and returns the memory of the lists of
+/// candidates, bytes.
 ///
 /// # Errors
 ///
 /// More pairs than [`MAX_PAIRS`].
-pub(crate) fn check_neighbors(parameters: &AuroraParameters, length_km: f64) -> Result<(), ShapeError> {
+pub(crate) fn check_neighbors(parameters: &AuroraParameters, length_km: f64) -> Result<f64, ShapeError> {
     let count = parameters.particles.count;
     let (key, neighbors) = match Support::new(parameters) {
         Support::Neighbors { count, .. } => ("neighbor_count", count),
@@ -73,7 +76,8 @@ pub(crate) fn check_neighbors(parameters: &AuroraParameters, length_km: f64) -> 
     };
     let max = MAX_PAIRS / count as f64;
     if neighbors <= max {
-        return Ok(());
+        let has_lists = parameters.particles.neighbor_search == NeighborSearch::SupportRadius;
+        return Ok(if has_lists { PAIR_BYTES * count as f64 * neighbors } else { 0.0 });
     }
     let kind = ShapeErrorKind::TooManyNeighbors { count, neighbors, max };
     Err(ShapeError { key: format!("particles.{key}"), kind })
@@ -157,7 +161,13 @@ impl Repulsion {
         rest_density: f64,
     ) -> f64 {
         self.cells.set_support_radius(support_km as f32);
-        particles.sort(&mut self.cells);
+        let positions = particles.positions.each_ref().map(Vec::as_slice);
+        if self.neighbor_cells.is_some() {
+            self.cells.sort(positions, &particles.ids);
+        } else {
+            self.cells.assign(positions, &particles.ids);
+        }
+        particles.reorder(&mut self.cells);
         let level = bansho_base::math::simd::level();
         dispatch!(level, _simd => particle_masses(&particles.fades, &mut self.masses));
         if let Some(cells) = &mut self.neighbor_cells {
@@ -168,7 +178,7 @@ impl Repulsion {
         }
         // A particle has its full mass in its own density: one that is fading in would otherwise have nearly no density
         // and be accelerated too much.
-        let self_density = self.density_kernel.at_center::<2>(self.cells.support_radius());
+        let self_density = self.density_kernel.at_center::<2>(support_km as f32);
         let state = StateEquation { rest_density: rest_density as f32, negative_pressure: true };
         let Self { masses, densities, pressures, stiffness, .. } = self;
         dispatch!(level, _simd => add_missing_self_density(densities, masses, self_density));

@@ -97,9 +97,8 @@ impl AuroraParticles {
         bansho_sph::retain(&mut self.sheets, keep);
     }
 
-    /// Sorts them into cells, by cell and then by id.
-    pub(super) fn sort(&mut self, cells: &mut Cells<2>) {
-        cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
+    /// Permutes them into the order of `cells`, to which they were assigned.
+    pub(super) fn reorder(&mut self, cells: &mut Cells<2>) {
         cells.reorder_all(self.float_arrays_mut());
         cells.reorder(&mut self.ids);
         cells.reorder(&mut self.dying);

@@ -53,6 +53,15 @@ impl Table {
         self.entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node)
     }
 
+    /// The value at a path: `key`, or one within tables, `table.key`.
+    pub fn at_path(&self, path: &str) -> Option<&Value> {
+        let Some((first, rest)) = path.split_once('.') else { return self.get(path).map(|node| &node.value) };
+        match &self.get(first)?.value {
+            Value::Table(inner) => inner.at_path(rest),
+            _ => None,
+        }
+    }
+
     /// Appends a key without a source location.
     pub fn push(&mut self, key: impl Into<String>, value: Value) {
         self.entries.push(Entry { key: key.into(), key_span: 0..0, node: Node::from(value) });
@@ -135,6 +144,21 @@ impl std::fmt::Display for Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_path_leads_through_tables_only() {
+        let mut inner = Table::default();
+        inner.push("key", Value::Integer(3));
+        let mut outer = Table::default();
+        outer.push("table", Value::Table(inner.clone()));
+        outer.push("number", Value::Integer(1));
+        assert_eq!(outer.at_path("number"), Some(&Value::Integer(1)));
+        assert_eq!(outer.at_path("table"), Some(&Value::Table(inner)));
+        assert_eq!(outer.at_path("table.key"), Some(&Value::Integer(3)));
+        for path in ["other", "table.other", "number.key", "table.key.key", ""] {
+            assert_eq!(outer.at_path(path), None, "{path}");
+        }
+    }
 
     #[test]
     fn texts_are_written_as_toml_strings() {

@@ -18,7 +18,7 @@ pub struct PaperSetting {
     pub key: &'static str,
     /// The values that do, in the syntax of scene files; an empty one is a key without a value.
     pub allowed: &'static [&'static str],
-    /// Where the paper says so.
+    /// Where the paper says so, or what the value is for: a phrase that follows the name of the paper and a comma.
     pub source: &'static str,
 }
 

@@ -175,6 +175,27 @@ fn sorting_keeps_every_particle_with_its_values() {
     assert_eq!(ids, given.ids);
 }
 
+#[test]
+fn sorting_alone_gives_the_order_of_assigning() {
+    let particles = cloud::<2>(3000, 1.0);
+    let positions = particles.positions.each_ref().map(Vec::as_slice);
+    let (mut assigned, mut sorted) = (Cells::new(0.1), Cells::new(0.1));
+    assigned.assign(positions, &particles.ids);
+    // Whatever it was used for before.
+    sorted.assign(positions, &particles.ids);
+    sorted.sort(positions, &particles.ids);
+    let order = |cells: &Cells<2>| {
+        let mut ids = particles.ids.clone();
+        cells.reorder(&mut ids);
+        ids
+    };
+    assert_eq!(order(&sorted), order(&assigned));
+    assert_ne!(order(&sorted), particles.ids);
+    let mut densities = Vec::new();
+    compute_densities(&sorted, SHAPES[0], &particles.masses, &mut densities);
+    assert!(densities.iter().all(|density| *density == 0.0), "there are no neighbors without candidates");
+}
+
 fn lattice_density<const D: usize>(side: usize, support: f32, kernel: KernelShape) -> f32 {
     let (mut particles, mut cells) = (lattice::<D>(side), Cells::new(support));
     particles.sort(&mut cells);

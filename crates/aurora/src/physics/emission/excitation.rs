@@ -282,7 +282,7 @@ mod tests {
             (170.0, 0.94, 0.12),
             (190.0, 0.967, 0.33),
         ] {
-            let found = [3.2e-11, 1.85e-10].map(|radius| left(altitude_km, radius));
+            let found = [32.0, 185.0].map(|radius_pm| left(altitude_km, 1e-12 * radius_pm));
             assert!((found[0] - of_collisions).abs() < 0.006, "{altitude_km}: {found:?}");
             assert!((found[1] - of_molecules).abs() < 0.006, "{altitude_km}: {found:?}");
         }

@@ -275,6 +275,85 @@ mod tests {
         assert!((variance / expected - 1.0).abs() < 0.1, "{variance} for {expected}");
     }
 
+    /// Altitudes of the collisions of an electron, km, from the highest down, by the steps of (2.21) with the probability (2.22) as printed. Steps are short:
+    /// that probability is at most 1/500.
+    fn stepped_fall(radius: f64, deflection: f64, energy_ev: f64, key: Key, particle: u64) -> Vec<f64> {
+        let cross_section = std::f64::consts::PI * radius * radius;
+        let levels = atmosphere().levels();
+        // How much of a step is downward: B and omega, two tangents, are added and made a unit vector. A new omega is drawn after each collision.
+        let descent = |collision: u32| {
+            let words = key.words(particle, collision, Purpose(1));
+            let [x, z] = normal_pair([words[0], words[1]]).map(|deviation| f64::from(deviation) * deflection);
+            1.0 / math::sqrt(1.0 + x * x + z * z)
+        };
+        let mut collisions = Vec::new();
+        let (mut altitude, mut downward) = (1000.0 * level_altitude_km(LEVELS - 1), descent(0));
+        for step in 0.. {
+            let place = (altitude - 1000.0 * level_altitude_km(0)) / LEVEL_SPACING;
+            if collisions.len() as f64 * COLLISION_EV >= energy_ev || place < 0.0 {
+                break;
+            }
+            // Between two levels the density is exponential.
+            let level = (place as usize).min(LEVELS - 2);
+            let [low, high] = [level, level + 1].map(|level| levels[level].number_density());
+            let density = low * math::exp((place - level as f64) * math::ln(high / low));
+            let length = (0.002 / (density * cross_section)).min(100.0);
+            altitude -= length * downward;
+            let words = key.words(particle, step, Purpose(2));
+            if uniform_f64(words[0], words[1]) < density * cross_section * length {
+                collisions.push(0.001 * altitude);
+                downward = descent(collisions.len() as u32);
+            }
+        }
+        collisions
+    }
+
+    /// Mean and squared standard error of a number of each of some electrons.
+    fn mean_and_error(values: &[f64]) -> [f64; 2] {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
+        [mean, squares / (count * (count - 1.0))]
+    }
+
+    /// Electrons of the literal scenes: 10 keV and spheres of 100 pm, with 25 times their deflection. The collisions of one electron depend on each other, so
+    /// that errors are those between electrons.
+    #[test]
+    fn falls_by_steps_of_time_have_the_same_altitudes() {
+        let (radius, deflection) = (1e-10, 0.05);
+        let spheres = HardSphereAtmosphere::new(atmosphere(), radius, deflection);
+        let mut stepped: Vec<Vec<f64>> = Vec::new();
+        for particle in 0..400 {
+            stepped.push(stepped_fall(radius, deflection, 1e4, Key::new(1, "stepped"), particle));
+        }
+        let mut sampled: Vec<Vec<f64>> = Vec::new();
+        for particle in 0..4000 {
+            let collisions = spheres.track(1e4, Key::new(2, "sampled"), particle);
+            sampled.push(collisions.map(|collision| f64::from(collision.altitude_km)).collect());
+        }
+        assert!(stepped.iter().chain(&sampled).all(|collisions| collisions.len() == 100));
+        let mean = |values: &Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+        let deviation = |values: &Vec<f64>| {
+            let mean = mean(values);
+            math::sqrt(values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / values.len() as f64)
+        };
+        let high = |values: &Vec<f64>| values.iter().filter(|value| **value > 150.0).count() as f64;
+        let lowest = |values: &Vec<f64>| values[values.len() - 1];
+        let statistics: [(&str, &dyn Fn(&Vec<f64>) -> f64); 4] =
+            [("mean", &mean), ("deviation", &deviation), ("above 150 km", &high), ("lowest", &lowest)];
+        for (name, statistic) in statistics {
+            let [by_steps, by_columns] = [&stepped, &sampled].map(|electrons| {
+                let values: Vec<f64> = electrons.iter().map(statistic).collect();
+                mean_and_error(&values)
+            });
+            let error = math::sqrt(by_steps[1] + by_columns[1]);
+            println!("measured: {name}: {} by steps, {} by columns, error {error}", by_steps[0], by_columns[0]);
+            assert!((by_steps[0] - by_columns[0]).abs() < 3.0 * error, "{name}: {by_steps:?} {by_columns:?}");
+            // Small enough that a fault would be found.
+            assert!(error < 0.03 * by_columns[0], "{name}: {error} of {}", by_columns[0]);
+        }
+    }
+
     #[test]
     fn falls_end_above_the_ground_and_go_down() {
         let spheres = HardSphereAtmosphere::new(atmosphere(), 1e-12, 0.1);

@@ -182,7 +182,8 @@ mod tests {
             assert!((*point - DVec2::from(expected)).length() < 1e-12, "{point} {expected:?}");
         }
         let stroke: Vec<DVec2> = (0..320).map(|i| DVec2::new(f64::from(i), 0.0)).collect();
-        assert_eq!(resample_by_printed_index(&stroke, 32)[31].x, 310.0);
+        // Counted from 1.
+        assert_eq!(resample_by_printed_index(&stroke, 32)[31].x + 1.0, 311.0);
         assert_eq!(resample_by_index(&stroke, 32)[31].x, 319.0);
     }
 

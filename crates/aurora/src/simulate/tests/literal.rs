@@ -1,6 +1,6 @@
 //! The thesis to the letter: rays by kernel, relocation by table 3.3, gaps by frame.
 
-use bansho_base::{math, math::random::Key};
+use bansho_base::{assert_measured, math, math::random::Key};
 
 use super::*;
 use crate::{
@@ -8,6 +8,7 @@ use crate::{
     RepulsionKernel,
     simulate::{
         field::{gauss_seidel_sweep, sheet_charge::scatter, sheet_field::FieldBuilder},
+        check_neighbors,
         forces::Repulsion,
     },
 };
@@ -108,6 +109,25 @@ fn the_spline_makes_rays_where_poly6_and_spiky_do_not() {
     let spline_in_cells = mean_contrast(RepulsionKernel::CubicSpline, NeighborSearch::ThreeByThreeCells, 2);
     assert!(spline > 2.0 * poly6_spiky, "{spline} {poly6_spiky}");
     assert!(spline_in_cells > 2.0 * poly6_spiky, "{spline_in_cells} {poly6_spiky}");
+    assert_measured!("contrast with the spline", spline, 0.245, 0.0005);
+    assert_measured!("contrast with poly6 and spiky", poly6_spiky, 0.085, 0.0005);
+    assert_measured!("contrast of the spline in 3 x 3 cells", spline_in_cells, 0.261, 0.0005);
+    assert_measured!("spline over poly6 and spiky", spline / poly6_spiky, 2.9, 0.05);
+}
+
+/// A sheet 240 km long and two cells of 10 km wide, whose particles have neighbors within two cells.
+#[test]
+fn only_a_search_by_radius_keeps_lists_of_neighbors() {
+    let parameters = literal(24.0, RepulsionKernel::CubicSpline);
+    let mut bytes = [NeighborSearch::SupportRadius, NeighborSearch::ThreeByThreeCells].map(|neighbor_search| {
+        let mut parameters = parameters.clone();
+        parameters.particles.neighbor_search = neighbor_search;
+        check_neighbors(&parameters, 240.0).unwrap()
+    });
+    let count = parameters.particles.count as f64;
+    // By hand: 14400 particles in a strip as wide as the band, and 40 km of it are within the radius.
+    bytes[0] /= count * count * 40.0 / 240.0;
+    assert!(bytes[0] > 0.3 && bytes[0] < 0.7 && bytes[1] == 0.0, "{bytes:?}");
 }
 
 /// Common acceleration of all particles of a sheet relative to the root mean square of theirs.
@@ -136,6 +156,8 @@ fn common_acceleration(repulsion_force: RepulsionForce) -> f64 {
 fn the_force_as_printed_lets_particles_drift_together() {
     let [both, printed] = [RepulsionForce::BothDensities, RepulsionForce::AsPrinted].map(common_acceleration);
     assert!(both < 1e-5 && printed > 100.0 * both.max(1e-6), "{both} {printed}");
+    assert_measured!("common acceleration of the force as printed", printed, 0.006, 0.0005);
+    assert_measured!("common acceleration with both densities", both, 3e-9, 3e-9);
 }
 
 #[test]
@@ -159,6 +181,8 @@ fn gauss_seidel_of_the_literal_scenes_leaves_little_of_the_charge() {
     };
     let [few, literal] = [20, 60].map(residual);
     assert!(literal < 0.01 && few > literal, "{few} {literal}");
+    assert_measured!("change by the 61st sweep, % of the depth", 100.0 * literal, 0.89, 0.005);
+    assert_measured!("change by the 21st sweep, % of the depth", 100.0 * few, 2.8, 0.05);
 }
 
 /// Table 3.3 on a still sheet: every near cell with fewer than 50 particles gets what it lacks, at most 10.
@@ -177,6 +201,7 @@ fn births_are_those_that_table_3_3_predicts() {
     simulation.step();
     let found = simulation.particles().len() - before;
     assert_eq!(found as f64, predicted);
+    assert_measured!("births", predicted, 523.0, 0.0);
 }
 
 /// Figure 2.14: without relocation no particle appears or disappears.
