@@ -41,8 +41,8 @@ const LEAST_MIXTURE: f32 = 2e-4;
 const MARGIN: usize = 3;
 /// Time in which the factor of emission follows the fire, s.
 const EMISSION_TIME_S: f32 = 0.3;
-/// Bounds of that factor. Flames with hardly any soot radiate by their gases, which are counted as more of it.
-const EMISSION_FACTORS: [f32; 2] = [0.02, 200.0];
+/// Bounds of that factor. A flame with hardly any soot radiates less than its fraction, since the radiation of its gases is not counted.
+const EMISSION_FACTORS: [f32; 2] = [0.02, 4.0];
 
 /// What the simulation of a flame depends on and never changes; all of its runs share it.
 #[derive(Debug)]
