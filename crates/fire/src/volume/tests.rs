@@ -1,7 +1,5 @@
 //! Fires on a grid: how they burn, and that runs of them agree. Figures of published fires are measured by the ignored tests, which take minutes.
 
-#![expect(clippy::print_stdout, reason = "figures of fires are shown with the tests")]
-
 use std::sync::Arc;
 
 use bansho_base::{
