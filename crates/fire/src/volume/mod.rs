@@ -13,7 +13,7 @@
 //!   simulation of smoke" (2001): fire and smoke on grids in computer graphics.
 //! - K. McGrattan et al., "Fire Dynamics Simulator, technical reference guide", NIST SP 1018: mixture fraction, radiant fraction, open sides.
 //! - M. Modest, "Radiative heat transfer" (2013): Planck mean of soot.
-//! - K. Engel, M. Kraus and T. Ertl, "High-quality pre-integrated volume rendering using hardware-accelerated pixel shading" (2001): [`render::sheet`].
+//! - K. Engel, M. Kraus and T. Ertl, "High-quality pre-integrated volume rendering using hardware-accelerated pixel shading" (2001): `render::sheet`.
 //! - G. Mulholland and C. Croarkin, "Specific extinction coefficient of flame generated smoke" (2000).
 //!
 //! # Equations
