@@ -22,6 +22,7 @@ const ALLOWED: [(&str, &[&str]); 17] = [
         &[
             "bansho-base",
             "bansho-sph",
+            "bansho-fluid",
             "bansho-fire",
             "bansho-rain",
             "bansho-aurora",
