@@ -25,7 +25,7 @@ def common_parameters(table: dict[str, Any]) -> list[dict[str, Any]]: ...
 def all_parameters(table: dict[str, Any]) -> list[dict[str, Any]]: ...
 
 __all__ = ["SceneTable", "Picture", "Camera", "Plate", "Wind", "Air", "Sky", "Ground", "Light", "Obstacle", "Fog",
-    "FlameSheet", "FlameParticles", "Rain", "Aurora"]
+    "FlameSheet", "FlameParticles", "FlameVolume", "Rain", "Aurora"]
 
 class Picture(SceneTable):
     """Size, frames and exposure of the picture.
@@ -657,6 +657,73 @@ class FlameParticles(SceneTable):
         step_s: float | None = ...,
         preroll_s: float | Literal["auto"] | None = ...,
         gas_model: Literal["combustion", "euler"] | None = ...,
+    ) -> None: ...
+
+class FlameVolume(SceneTable):
+    """Burning gas on a grid, for fires that neck, roll and puff, and are seen from any side.
+
+    name:
+        Unique name; names its layers. Allowed: a string without dots.
+    enabled:
+        Whether it is drawn. Allowed: true or false. Default: True.
+    position:
+        Position of the flame. The positions of burners and domain are relative to it. [m] Allowed: a list of 3 numbers
+        from -1000000 to 1000000. Default: [0.0, 0.0, 0.0].
+    burners:
+        Burners; an empty list is one burner with default values. Allowed: a list of 0 to 200 items, each a table.
+        Default: [].
+    fuel:
+        What burns. Allowed: one of "wood", "methane", "propane", "heptane", "methanol", "ethanol", "acetone", "smoke".
+        Default: 'wood'. `wood`:  Vapors of wood. `methane`:  Methane, natural gas. `propane`:  Propane, bottled gas.
+        `heptane`:  Heptane, much like gasoline. `methanol`:  Methanol, whose flames have hardly any soot. `ethanol`:
+        Ethanol, spirit. `acetone`:  Acetone. `smoke`:  Nothing burns: hot smoke.
+    quality:
+        How fine the grid is. Allowed: one of "preview", "standard", "final". Default: 'standard'. `preview`:  9 cells
+        across a burner or a characteristic diameter: for looking at motion. `standard`:  14 cells. `final`:  24 cells.
+    resolution:
+        Cells in a meter; `"auto"` follows from `quality`, the burners and their heat. [1/m] Allowed: "auto" or a number
+        from 0.5 to 2000. Default: 'auto'.
+    floor:
+        Whether the bottom of the domain is a floor. Otherwise air flows in from below, as around a torch. Allowed: true
+        or false. Default: True.
+    domain_min:
+        Minimum corner of the simulated domain relative to `position`; `"auto"` leaves enough space around the flame.
+        [m] Allowed: "auto" or a list of 3 numbers from -1000000 to 1000000. Default: 'auto'.
+    domain_max:
+        Maximum corner of the simulated domain relative to `position`. [m] Allowed: "auto" or a list of 3 numbers from
+        -1000000 to 1000000. Default: 'auto'.
+    gas:
+        Mixing, heat and soot. Allowed: a table. Default: {'radiant_fraction': 'auto', 'soot_ppm': 'auto',
+        'smoke_yield': 'auto', 'flame_temperature_k': 'auto', 'smagorinsky': 0.1, 'unevenness': 0.3}.
+    rendering:
+        Appearance. Allowed: a table. Default: {'soot_gain': 1.0, 'blue': 1.0, 'smoke_albedo': 0.3, 'heat_haze_gain':
+        1.0, 'sparks': {'rate': 0.0, 'speed': 2.2, 'speed_variation': 0.5, 'swirl': 0.12, 'lifetime_s': 1.8, 'diameter':
+        0.004, 'temperature_k': 1750.0}, 'light': {'scale': 1.0, 'count': 3}}.
+    step_s:
+        Time between states. The solver divides it so that no gas crosses more than a cell in one of its steps. [s]
+        Allowed: a number from 0.001 to 0.1. Default: 0.016666666666666666.
+    preroll_s:
+        Duration of the simulation before the shot; `"auto"` is long enough for the flame to develop fully. [s] Allowed:
+        "auto" or a number from 0 to 600. Default: 'auto'.
+    """
+
+    def __init__(
+        self,
+        *,
+        name: str | None = ...,
+        enabled: bool | None = ...,
+        position: Vector3 | None = ...,
+        burners: Sequence[Mapping[str, Any]] | None = ...,
+        fuel: Literal["wood", "methane", "propane", "heptane", "methanol", "ethanol", "acetone", "smoke"] | None = ...,
+        quality: Literal["preview", "standard", "final"] | None = ...,
+        resolution: float | Literal["auto"] | None = ...,
+        floor: bool | None = ...,
+        domain_min: Vector3 | Literal["auto"] | None = ...,
+        domain_max: Vector3 | Literal["auto"] | None = ...,
+        gas: Mapping[str, Any] | None = ...,
+        rendering: Mapping[str, Any] | None = ...,
+        step_s: float | None = ...,
+        preroll_s: float | Literal["auto"] | None = ...,
     ) -> None: ...
 
 class Rain(SceneTable):
