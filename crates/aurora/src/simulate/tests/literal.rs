@@ -7,8 +7,8 @@ use crate::{
     FieldCharge, FieldSolver, NeighborSearch, PowerDistribution, RayParameters, RelocationParameters, RepulsionForce,
     RepulsionKernel,
     simulate::{
-        field::{gauss_seidel_sweep, sheet_charge::scatter, sheet_field::FieldBuilder},
         check_neighbors,
+        field::{gauss_seidel_sweep, sheet_charge::scatter, sheet_field::FieldBuilder},
         forces::Repulsion,
     },
 };
