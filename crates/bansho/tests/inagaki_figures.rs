@@ -101,6 +101,8 @@ fn wind_to_the_left_and_to_the_right_moves_the_light_to_that_side() {
         (to_the_left - 184.0).abs() < 15.0 && (to_the_right - 203.0).abs() < 15.0,
         "{to_the_left} {to_the_right} from {still}"
     );
+    bansho::base::assert_measured!("light of the upper half to the left, pixels", to_the_left, 187.0, 0.5);
+    bansho::base::assert_measured!("light of the upper half to the right, pixels", to_the_right, 214.0, 0.5);
 }
 
 /// Largest and mean displacement of what is far behind the gas, pixels at full size: mean of the pixels that are displaced at all.
@@ -127,6 +129,13 @@ fn haze_displaces_tens_of_pixels_when_exaggerated_and_two_by_physics() {
     assert!((strong[0] - 38.2).abs() < 2.0 && (strong[1] - 2.45).abs() < 0.2, "{strong:?}");
     assert!((physical[0] - 1.9).abs() < 0.2 && (physical[1] - 0.34).abs() < 0.04, "{physical:?}");
     assert_eq!(none[0], 0.0);
+    bansho::base::assert_measured!("largest displacement, pixels", strong[0], 38.5, 0.05);
+    bansho::base::assert_measured!("mean displacement, pixels", strong[1], 2.5, 0.06);
+    bansho::base::assert_measured!("largest displacement by physics, pixels", physical[0], 1.9, 0.05);
+    bansho::base::assert_measured!("mean displacement by physics, pixels", physical[1], 0.3, 0.05);
+    // 42 degrees are 720 pixels.
+    let focal = 360.0 / math::tan(21.0_f64.to_radians());
+    bansho::base::assert_measured!("largest deflection, rad", strong[0] / focal, 0.041, 5e-4);
     let [without, with] = ["5", "6"].map(|number| frames(&figure(number), &[40], false).remove(0));
     let changed = light(&with).iter().zip(light(&without)).map(|(a, b)| (a - b).abs() > 0.02).collect::<Vec<_>>();
     let columns = |range: std::ops::Range<usize>| {
@@ -150,6 +159,9 @@ fn the_papers_flame_has_the_color_of_its_temperature() {
     assert!((x - expected_x).abs() < 1e-3 && (y - expected_y).abs() < 1e-3);
     // Planck at 1900 K with the CIE 1931 observer, computed independently.
     assert!((x - 0.537_777).abs() < 1e-3 && (y - 0.411_202).abs() < 1e-3, "{x} {y}");
+    bansho::base::assert_measured!("x at 1900 K", x, 0.5378, 0.001);
+    bansho::base::assert_measured!("y at 1900 K", y, 0.4112, 0.001);
+    bansho::base::assert_measured!("z at 1900 K", 1.0 - x - y, 0.0510, 0.002);
 }
 
 /// CIE x and y of an ACEScg color.

@@ -174,7 +174,7 @@ fn encoded(choices: &Choices) -> impl Fn([f64; 3]) -> [f64; 3] + use<> {
 
 #[test]
 fn the_stages_are_the_papers_formulas_within_one_step_of_255() {
-    for (picture, stage) in [(1, 0), (2, 1), (3, 2)] {
+    for (picture, stage, stated_steps) in [(1, 0, 0.03), (2, 1, 0.03), (3, 2, 0.15)] {
         let choices = Choices::of(&scene_text(picture));
         let (formulas, scale) = (stages(&choices), exposure(&choices));
         let frame = &render(&choices.text, [SIZE; 2], &[FRAME])[0];
@@ -186,6 +186,7 @@ fn the_stages_are_the_papers_formulas_within_one_step_of_255() {
             lit += usize::from(wanted > 0.1);
         }
         assert!(worst < STEP && lit > SIZE * SIZE / 4, "picture {picture}: {:.3} steps apart, {lit} lit", worst / STEP);
+        bansho::base::assert_measured!(format!("picture {picture}, steps of 255"), worst / STEP, stated_steps, 0.005);
     }
 }
 
@@ -202,12 +203,13 @@ fn the_colored_stage_is_equation_7_within_one_step_of_255() {
             encoded(pixel).iter().zip(wanted).fold(worst, |worst, (value, wanted)| worst.max((value - wanted).abs()));
     }
     assert!(worst < STEP, "{:.3} steps", worst / STEP);
+    bansho::base::assert_measured!("picture 4, steps of 255", worst / STEP, 0.71, 0.005);
 }
 
 #[test]
 fn the_finished_flame_is_mapped_by_equations_9_to_18() {
     // P is random; without its flutter it is 1, and the edge (15) is A + D.
-    for picture in [5, 6, 7, 8] {
+    for (picture, stated_steps) in [(5, 0.88), (6, 0.7), (7, 1.8), (8, 0.4)] {
         let choices = Choices::of(&scene_text(picture));
         let flutter = format!("flutter = {}", choices.value("flutter").unwrap());
         let text = choices
@@ -236,6 +238,12 @@ fn the_finished_flame_is_mapped_by_equations_9_to_18() {
         let (within, count) = (apart.iter().filter(|steps| **steps < 1.0).count(), apart.len());
         let share = within as f64 / count as f64;
         assert!(count > 5000 && share > 0.99 && outside == 0, "picture {picture}: {share}, worst {}", apart[count - 1]);
+        bansho::base::assert_measured!(
+            format!("picture {picture}, steps of 255"),
+            apart[count - 1],
+            stated_steps,
+            0.05
+        );
     }
 }
 
@@ -247,6 +255,17 @@ fn judged(text: &str) -> FlameStatistics {
     FlameStatistics::new(&masks).unwrap()
 }
 
+/// Asserts that the statistics are those that the page states: height, body, pieces, redness of edges, width of the base, pale part, lit area.
+fn assert_statistics(flame: &str, found: &FlameStatistics, stated: [f64; 7]) {
+    let names = ["height", "body", "pieces", "edge redness", "base width", "pale", "area"];
+    let found = [found.height, found.body, found.pieces, found.edge_redness, found.base_width, found.pale, found.area];
+    for ((name, found), stated) in names.into_iter().zip(found).zip(stated) {
+        // As many digits as are stated.
+        let tolerance = if name == "pieces" { 0.05 } else { 0.005 };
+        bansho::base::assert_measured!(format!("{flame}, {name}"), found, stated, tolerance + 1e-9);
+    }
+}
+
 #[test]
 fn the_four_flames_are_judged_to_be_flames_and_to_differ() {
     let judgments = [5, 6, 7, 8].map(|picture| judged(&scene_text(picture)));
@@ -256,6 +275,16 @@ fn the_four_flames_are_judged_to_be_flames_and_to_differ() {
         assert!(flame.base_width < 0.75, "picture {picture}: the base is not cut off: {flame:?}");
         assert!(flame.pale < 0.35, "picture {picture}: orange rather than cream: {flame:?}");
         assert!((0.5..0.95).contains(&flame.height), "picture {picture}: {flame:?}");
+    }
+    // Height, body, pieces, redness of edges, width of the base, pale part, lit area.
+    let stated = [
+        [0.80, 0.97, 5.3, 0.34, 0.16, 0.12, 0.21],
+        [0.81, 0.97, 3.6, 0.41, 0.33, 0.14, 0.14],
+        [0.73, 0.93, 7.1, 0.40, 0.32, 0.07, 0.19],
+        [0.84, 1.00, 1.6, 0.29, 0.17, 0.26, 0.15],
+    ];
+    for ((picture, flame), stated) in (5..).zip(&judgments).zip(stated) {
+        assert_statistics(&format!("picture {picture}"), flame, stated);
     }
     let [broad, tall, ragged, calm] = judgments;
     assert!([broad, tall, ragged].iter().all(|flame| flame.pieces > 1.5), "tongues break off");
@@ -280,6 +309,7 @@ fn a_flame_that_is_cut_off_pale_and_full_of_holes_is_judged_so() {
     }
     let flame = judged(&text);
     assert!(flame.base_width > 0.75 && flame.body < 0.9 && flame.pale > 0.5, "{flame:?}");
+    assert_statistics("a bad flame", &flame, [0.93, 0.70, 5.5, 0.93, 0.89, 0.95, 0.28]);
 }
 
 /// A scene of the paper's future work.
@@ -302,6 +332,9 @@ fn sparks_and_smoke_are_shown_together_with_the_flame() {
     let (smoky, clear) = (cover(&all) / upper as f64, cover(&no_smoke) / upper as f64);
     assert!((20..2000).contains(&sparks), "{sparks} pixels of sparks");
     assert!(smoky > 0.15 && clear < 0.02, "{smoky} {clear}");
+    bansho::base::assert_measured!("pixels of sparks", sparks as f64, 83.0, 0.0);
+    bansho::base::assert_measured!("cover of the smoke, %", 100.0 * smoky, 19.0, 0.5);
+    bansho::base::assert_measured!("cover without smoke, %", 100.0 * clear, 0.0, 0.5);
     let lit = |frame: &Frame| frame.beauty.pixels()[upper..].iter().filter(|pixel| pixel[0] > 0.3).count();
     assert!(lit(&all) > 4000, "the flame stays: {}", lit(&all));
 }
@@ -316,6 +349,8 @@ fn flames_stand_in_a_3d_scene() {
         let depths: Vec<f32> = (0..depth.len()).filter(lit).map(|i| depth[i]).collect();
         let (near, far) = depths.iter().fold((f32::INFINITY, 0.0_f32), |(a, b), d| (a.min(*d), b.max(*d)));
         assert!((4.6..5.0).contains(&near) && (6.6..7.1).contains(&far), "{near} m to {far} m");
+        bansho::base::assert_measured!("nearest flame, m", f64::from(near), 4.8, 0.05);
+        bansho::base::assert_measured!("farthest flame, m", f64::from(far), 6.9, 0.05);
     }
     // The ground is lit by the flames: without them the picture is dark.
     let light = |frame: &Frame| frame.beauty.pixels().iter().map(|p| f64::from(p[1])).filter(|g| *g < 0.2).sum::<f64>();

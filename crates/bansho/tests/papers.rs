@@ -1,5 +1,6 @@
 //! The four papers, item by item: each page of the book in `docs/src/papers` has a table of every numbered equation, figure, table and item of future work.
-//! Every row names a scene, a command or a function that exists, a number, a test that measures it, and whether it is done or why not.
+//! Every row names a scene, a command or a function that exists, a number, a test that measures it, and whether it is done or why not. Its numbers are those
+//! of the test: `cargo test -- --nocapture` prints what was measured.
 
 #[path = "support/sources.rs"]
 mod sources;
@@ -68,6 +69,30 @@ fn every_row_names_what_exists_and_a_number_that_a_test_measures() {
     let of_paper =
         |paper: &Paper| -> Vec<String> { rows(paper).iter().flat_map(|row| faults(paper, row, &tests)).collect() };
     report(PAPERS.iter().flat_map(of_paper).collect());
+}
+
+#[test]
+fn the_numbers_of_a_row_are_those_of_its_tests() {
+    let files: Vec<String> = rust_files(&Path::new(ROOT).join("crates")).iter().map(|file| read(file)).collect();
+    let mut faults = Vec::new();
+    for paper in &PAPERS {
+        for row in rows(paper) {
+            let tests = code(&row.test);
+            // What a command prints depends on the machine.
+            if tests.is_empty() || tests.iter().any(|test| test.starts_with("bansho ")) {
+                continue;
+            }
+            let with_test = |test: &String| -> Vec<String> {
+                files.iter().filter(|file| has_test(file, test)).map(|file| with_helpers(file, test)).collect()
+            };
+            let known: Vec<f64> = tests.iter().flat_map(with_test).flat_map(|source| numbers(&source)).collect();
+            let missing = unknown_numbers(&row.measured, &known);
+            if !missing.is_empty() {
+                faults.push(format!("{}: {}: its tests do not have {missing:?}", paper.name, row.item));
+            }
+        }
+    }
+    report(faults);
 }
 
 fn report(faults: Vec<String>) {
@@ -192,6 +217,81 @@ fn is_scene(path: &str) -> bool {
     Path::new(ROOT).join(path).is_file()
 }
 
+/// The numbers of a text that are not among the known ones, nor their percentages. Code, powers and numbers of equations in parentheses do not count.
+fn unknown_numbers(text: &str, known: &[f64]) -> Vec<f64> {
+    let prose: String = text.split('`').step_by(2).collect();
+    let is_equation = |part: &str| part.chars().all(|letter| letter.is_ascii_digit() || letter == '.');
+    let prose: Vec<&str> = prose.split(['(', ')']).filter(|part| !is_equation(part)).collect();
+    // Thousands are separated by commas.
+    let letters: Vec<char> = prose.join(" ").chars().collect();
+    let is_digit = |index: usize| letters.get(index).is_some_and(char::is_ascii_digit);
+    let is_separator = |index: usize| letters[index] == ',' && index > 0 && is_digit(index - 1) && is_digit(index + 1);
+    let prose: String = (0..letters.len()).filter(|index| !is_separator(*index)).map(|index| letters[index]).collect();
+    let is_known = |number: &f64| {
+        let is_same =
+            |known: &f64| [1.0, 100.0, 0.01].iter().any(|unit| (known * unit - number).abs() < 1e-9 * number.max(1.0));
+        known.iter().any(is_same)
+    };
+    numbers(&prose).into_iter().filter(|number| !is_known(number)).collect()
+}
+
+/// The numbers of a text, without their signs; not those within words.
+fn numbers(text: &str) -> Vec<f64> {
+    // The ends of a range.
+    let text = text.replace("..", " .. ");
+    let is_part_of_word = |letter: char| letter.is_alphanumeric() || "._-".contains(letter);
+    let words = text.split(|letter: char| !is_part_of_word(letter)).map(|word| word.trim_matches(['-', '.', '_']));
+    let words = words.filter(|word| word.starts_with(|letter: char| letter.is_ascii_digit()));
+    words.filter_map(|word| word.replace('_', "").parse().ok()).collect()
+}
+
+/// Whether a source has a function of that name.
+fn has_test(source: &str, name: &str) -> bool {
+    source.contains(&format!("fn {name}()"))
+}
+
+/// The test of that name in a source, with the functions and constants of the source that it names, and those that these name.
+fn with_helpers(source: &str, test: &str) -> String {
+    let items = named_items(source);
+    let (mut names, mut next) = (vec![test], 0);
+    let mut text = String::new();
+    while let Some(name) = names.get(next) {
+        let item = items.get(name).copied().unwrap_or_default();
+        text.push_str(item);
+        text.push('\n');
+        for word in item.split(|letter: char| !letter.is_alphanumeric() && letter != '_') {
+            if items.contains_key(word) && !names.contains(&word) {
+                names.push(word);
+            }
+        }
+        next += 1;
+    }
+    text
+}
+
+/// The functions and constants of a source by their names: from the line that declares them to the one that closes them, at the same indentation.
+fn named_items(source: &str) -> BTreeMap<&str, &str> {
+    let mut items = BTreeMap::new();
+    let mut start = 0;
+    for line in source.split_inclusive('\n') {
+        let rest = &source[start..];
+        let declaration = line.trim_start();
+        let indent = &line[..line.len() - declaration.len()];
+        let declaration =
+            declaration.trim_start_matches("pub(crate) ").trim_start_matches("pub(super) ").trim_start_matches("pub ");
+        for (keyword, end) in [("fn ", format!("\n{indent}}}")), ("const ", ";\n".to_owned())] {
+            if let Some(name) = declaration.strip_prefix(keyword) {
+                let name =
+                    name.split(|letter: char| !letter.is_alphanumeric() && letter != '_').next().unwrap_or_default();
+                let length = rest.find(&end).unwrap_or(rest.len());
+                items.insert(name, &rest[..length]);
+            }
+        }
+        start += line.len();
+    }
+    items
+}
+
 /// The names of all functions with the attribute `#[test]`.
 fn test_names() -> BTreeSet<String> {
     let files: Vec<PathBuf> = rust_files(&Path::new(ROOT).join("crates"));
@@ -230,6 +330,17 @@ mod checks {
             let found = of(&line);
             assert!(found.len() == 1 && found[0].contains(expected), "{line}: {found:?}");
         }
+    }
+
+    #[test]
+    fn numbers_that_no_test_has_are_found() {
+        let source = "const SIZE: usize = 1_280;\nfn helper() {\n    0.5\n}\n#[test]\nfn a_test() {\n    for i in 0..240 {\n        helper() + 1e-4 + 0.89;\n        SIZE;\n    }\n}\nfn other() {\n    7\n}\n";
+        assert!(has_test(source, "a_test") && !has_test(source, "b_test"));
+        let known = numbers(&with_helpers(source, "a_test"));
+        assert_eq!(known, [0.0, 240.0, 1e-4, 0.89, 0.5, 1280.0]);
+        let unknown = |text: &str| unknown_numbers(text, &known);
+        assert_eq!(unknown("1,280 pixels, 89 % and 0.5 of 240, within 1e-4 by (2.25) and `n = 3`"), [0.0; 0]);
+        assert_eq!(unknown("-7 km, 0.6 or T1"), [7.0, 0.6]);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use bansho_aurora::{
     shapes::{FRAME_S, Sequence, Sheet},
 };
 use bansho_base::{
+    assert_measured,
     color::srgb_from_acescg,
     host::{assets::MemoryAssets, observer::Unobserved},
     math::DVec2,
@@ -95,18 +96,32 @@ fn a_merge_closes_at_its_last_frame_and_not_before() {
         gap([&shape.sheets[1], &shape.sheets[2]])[0]
     });
     assert!(widths.windows(2).all(|pair| pair[1] < pair[0]) && widths[2] > 1.0, "{widths:?}");
+    assert_measured!("frame at which the gap closes", sequence.duration() / FRAME_S, 280.0, 1e-6);
     let merged = sequence.at(sequence.duration());
     assert_eq!(merged.sheets.len(), 2);
 }
 
 /// A scene with few particles, drawn at a size: linear sRGB of each pixel, 1 is the white of the maps.
 fn drawn(text: &str, size: usize, frame: i64) -> Vec<[f32; 3]> {
+    let [frame] = drawn_frames(text, size, [frame]);
+    frame
+}
+
+/// As [`drawn`], several frames.
+fn drawn_frames<const N: usize>(text: &str, size: usize, frames: [i64; N]) -> [Vec<[f32; 3]>; N] {
     let text = text.replace("count = 120_000", "count = 20_000");
     let scene = Scene::parse("test.toml", &text, KINDS).unwrap_or_else(|error| panic!("{error}"));
     let options = PlanOptions { size: Some([size; 2]), ..PlanOptions::default() };
     let mut shot = Planned::new(scene, &options, Arc::new(MemoryAssets::default())).open();
-    let frame = bansho::draw(&mut shot, frame, &Unobserved).unwrap();
-    frame.beauty.pixels().iter().map(|[red, green, blue, _]| srgb_from_acescg([*red, *green, *blue])).collect()
+    frames.map(|frame| {
+        let frame = bansho::draw(&mut shot, frame, &Unobserved).unwrap();
+        frame.beauty.pixels().iter().map(|[red, green, blue, _]| srgb_from_acescg([*red, *green, *blue])).collect()
+    })
+}
+
+/// A scene whose particles [`drawn`] leaves as they are.
+fn with_all_particles(text: &str) -> String {
+    text.replace("count = 120_000", "count = 120000")
 }
 
 fn is_red(pixel: &[f32; 3]) -> bool {
@@ -129,13 +144,14 @@ fn fraction(pixels: &[[f32; 3]], is_counted: impl Fn(&[f32; 3]) -> bool) -> f64 
 /// Figure 2.10: as many cells have particles as the band of L_thr about the shape covers.
 #[test]
 fn scattered_particles_cover_the_band_about_the_shape() {
-    let pixels = drawn(&text("sekiguchi_figure_2_10.toml"), 256, 0);
+    let pixels = drawn(&with_all_particles(&text("sekiguchi_figure_2_10.toml")), 256, 0);
     let covered = 1.0 - fraction(&pixels, is_blue);
     let sequence = sequence(&text("sekiguchi_figure_2_10.toml"));
     // The band is two cells wide; it touches three cells and more across, of which those with few particles look blue.
     let length = sequence.at(0.0).length() / (600.0 / 256.0);
     let across = covered * 256.0 * 256.0 / length;
     assert!((2.0..3.3).contains(&across), "{across}");
+    assert_measured!("width of the band, cells", across, 2.2, 0.05);
 }
 
 /// Figures 2.9 and 2.15: as many black points as control points, on segments of the length of the shape.
@@ -153,12 +169,16 @@ fn the_shape_is_drawn_with_its_control_points() {
 /// Figure 2.12: the potential is lowest, blue, on the shape and highest, red, far from it. Figure 2.11: noise has all colors.
 #[test]
 fn the_potential_is_low_on_the_shape_and_the_noise_is_everywhere() {
-    let potential = drawn(&text("sekiguchi_figure_2_12.toml"), 256, 0);
+    let potential = drawn(&with_all_particles(&text("sekiguchi_figure_2_12.toml")), 256, 0);
     let low = fraction(&potential, is_blue);
     assert!((0.005..0.1).contains(&low) && fraction(&potential, is_red) > 0.5, "{low}");
+    assert_measured!("figure 2.12 in the lowest color, %", 100.0 * low, 1.3, 0.05);
+    assert_measured!("figure 2.12 in the highest color, %", 100.0 * fraction(&potential, is_red), 89.0, 0.5);
     let noise = drawn(&text("sekiguchi_figure_2_11.toml"), 256, 0);
     let [low, high] = [fraction(&noise, is_blue), fraction(&noise, is_red)];
     assert!((0.005..0.2).contains(&low) && (0.005..0.2).contains(&high), "{low} {high}");
+    assert_measured!("figure 2.11 in the lowest color, %", 100.0 * low, 1.9, 0.05);
+    assert_measured!("figure 2.11 in the highest color, %", 100.0 * high, 1.8, 0.05);
 }
 
 /// Figure 3.14 and section 3.3: within the fold the potential is low enough to be near, but no particles were scattered there.
@@ -177,6 +197,8 @@ fn the_potential_alone_takes_the_inside_of_the_fold_for_the_sheet() {
     assert!(is_blue(&at(0.0, 200.0)), "{:?}", at(0.0, 200.0));
     let near = fraction(&pixels, is_red);
     assert!((0.01..0.05).contains(&near) && fraction(&pixels, is_yellow) > 3.0 * near, "{near}");
+    assert_measured!("cells that are near by the potential alone, %", 100.0 * fraction(&pixels, is_yellow), 21.0, 0.5);
+    assert_measured!("cells that are near by both, %", 100.0 * near, 1.2, 0.05);
 }
 
 /// Figure 2.14: without relocation the particles stay behind at the beginning of the shape and leave its other half empty.
@@ -184,16 +206,22 @@ fn the_potential_alone_takes_the_inside_of_the_fold_for_the_sheet() {
 fn relocation_keeps_the_particles_on_the_shape() {
     let shape = sequence(&text("sekiguchi_figure_2_15.toml")).at(140.0 * FRAME_S);
     // Control points of the second half of the shape around which no cell has particles: 600 km are 256 pixels.
-    let empty = |name: &str| {
-        let pixels = drawn(&text(name), 256, 140);
+    let empty = |pixels: &Vec<[f32; 3]>| {
         let is_empty = |point: &DVec2| {
             let [x, z] = [point.x, point.y].map(|km| ((km / 600.0 + 0.5) * 256.0) as usize);
             (z - 4..=z + 4).all(|row| (x - 4..=x + 4).all(|column| is_blue(&pixels[row * 256 + column])))
         };
         shape.sheets[0].points[16..].iter().filter(|point| is_empty(point)).count()
     };
-    let [without, with] = ["sekiguchi_figure_2_14_left.toml", "sekiguchi_figure_2_14_right.toml"].map(empty);
+    let frames = ["sekiguchi_figure_2_14_left.toml", "sekiguchi_figure_2_14_right.toml"]
+        .map(|name| drawn_frames(&text(name), 256, [140, 180]));
+    let [without, with] = frames.each_ref().map(|[first, _]| empty(first));
     assert!(without >= 8 && with <= 1, "{without} and {with} of 16 are empty");
+    // With a sixth of the particles.
+    let with_particles = |pixels: &Vec<[f32; 3]>| 100.0 * (1.0 - fraction(pixels, is_blue));
+    let [without, with] = frames.each_ref().map(|[_, later]| with_particles(later));
+    assert_measured!("cells with particles without relocation, %", without, 0.34, 0.005);
+    assert_measured!("cells with particles with relocation, %", with, 0.63, 0.005);
 }
 
 /// Tables 3.2 and 3.3, as all five scenes and the figures have them.

@@ -286,6 +286,45 @@ fn the_shape_of_a_flame_is_that_of_the_scene() {
     assert!(run.stderr.contains("scene.toml:3:9: flame_sheet.0.shape.fringe_width"), "{}", run.stderr);
 }
 
+/// Figures 2 to 4, 6 and 7 of Ohshima and Itahashi for picture 5.
+#[test]
+fn the_curves_of_picture_5_are_those_that_its_page_states() {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/papers/ohshima_itahashi/ohshima_picture_5.toml");
+    let curves = Csv::of(&["transfer-curves", scene]);
+    bansho::base::assert_measured!("argument at which C is largest", curves.peak(1), 0.72, 0.005);
+    bansho::base::assert_measured!("largest C", curves.row(curves.peak(1))[1], 1.0, 0.005);
+    bansho::base::assert_measured!("C(1)", curves.row(1.0)[1], 0.88, 0.005);
+    for (s, stated) in [(0.5, [1.0, 0.56, 0.06]), (1.0, [1.0, 0.96, 0.74])] {
+        for (name, found, stated) in [("R", 2, stated[0]), ("G", 3, stated[1]), ("B", 4, stated[2])] {
+            bansho::base::assert_measured!(format!("{name}({s})"), curves.row(s)[found], stated, 0.005);
+        }
+    }
+    // Rows are 1/256 apart.
+    let shape = Csv::of(&["flame-shape", scene, "--height", "0.5"]);
+    let last = |is_before: &dyn Fn(&Vec<f64>) -> bool| shape.rows.iter().rfind(|row| is_before(row)).unwrap()[0];
+    bansho::base::assert_measured!("w up to which V is 0", last(&|row| row[1] == 0.0), 0.26, 0.005);
+    bansho::base::assert_measured!("V(1)", shape.row(1.0)[1], 1.0, 1e-6);
+    for (u, stated) in [(0.0, 1.0), (0.5, 0.0), (1.0, 1.0)] {
+        bansho::base::assert_measured!(format!("H({u})"), shape.row(u)[2], stated, 1e-6);
+    }
+    bansho::base::assert_measured!("x' up to which K is 1, at w = 0.5", last(&|row| row[7] == 1.0), 0.40, 0.005);
+    bansho::base::assert_measured!(
+        "x' up to which K is above h, at w = 0.5",
+        last(&|row| row[7] > 0.72 + 1e-6),
+        0.76,
+        0.005
+    );
+    bansho::base::assert_measured!("h", shape.row(1.0)[7], 0.72, 1e-6);
+    // P of (15) at both edges.
+    for row in &shape.rows {
+        let fringe = row[5] - row[4];
+        for edge in [row[8], row[9]].into_iter().filter(|_| fringe > 1e-3) {
+            let p = (edge - row[4]) / fringe;
+            assert!((0.2 - 1e-3..=1.0 + 1e-3).contains(&p), "{p} at {}", row[0]);
+        }
+    }
+}
+
 #[test]
 fn statistics_of_a_flame_are_plotted_and_printed() {
     let flame = "bansho = 2\n[picture]\nsize = [320, 180]\nframes = 60\n[sky]\nluminance = 0.0\n[[flame_sheet]]\n";

@@ -239,6 +239,8 @@ mod tests {
             let number = reynolds_number(found, diameter, &air);
             assert!(near(number, re, 1e-4) && near(drag_coefficient(number), c, 1e-4), "{diameter} mm");
         }
+        bansho_base::assert_measured!("drag coefficient below Re = 1", drag_coefficient(1.0 - 1e-9), 24.0, 1e-3);
+        bansho_base::assert_measured!("drag coefficient above Re = 1", drag_coefficient(1.0 + 1e-9), 28.6, 0.05);
     }
 
     #[test]

@@ -132,7 +132,11 @@ fn disc_integral(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::reference::{fields, near};
+    use crate::{
+        VelocityLaw,
+        drops::terminal_velocity::TerminalVelocity,
+        tests::reference::{fields, near},
+    };
 
     /// Streaks of the reference table with its exposure share and its mean over the streak's box, which take a square drop.
     fn references() -> Vec<(Streak, f64, f64)> {
@@ -169,7 +173,11 @@ mod tests {
             // Averaged across the streak, a disc is pi/4 of its width.
             let factor = OpacityLaw::Paper.factor(diameter, speed, 1.0 / 30.0);
             assert!(near(factor, 2000.0 / 30.0 * 4.0 / PI, 1e-9), "{diameter} mm: {factor}");
+            bansho_base::assert_measured!("opacity over the fraction of 1/30 s", ratio, 66.7, 0.05);
         }
+        let law = TerminalVelocity { law: VelocityLaw::RigidSphere, ..TerminalVelocity::default() };
+        let speed = law.speed(1.0);
+        bansho_base::assert_measured!("opacity at 1 mm by the rigid sphere", paper_opacity(1.0, speed), 0.516, 5e-4);
         // A fast exposure changes the fraction, not the paper's number.
         assert!(near(OpacityLaw::Paper.factor(1.0, 4.03, 1e-3), 2.0 * 4.0 / PI, 1e-9));
         assert_eq!((paper_opacity(3.0, 1.0), OpacityLaw::ExposureFraction.factor(1.0, 4.03, 0.01)), (1.0, 1.0));

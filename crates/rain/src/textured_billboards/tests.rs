@@ -158,6 +158,9 @@ fn a_rate_that_rises_and_falls_never_pops_but_with_the_papers_textures() {
         assert!(opacities.is_sorted(), "{method:?}: heavier rain never hides less");
         let step = largest_step(&opacities);
         assert!(step < 0.06 && opacities[60] > 8.0 * opacities[0], "{method:?}: {step}");
+        if method == Method::Billboards {
+            bansho_base::assert_measured!("largest step by Bansho's own method, %", 100.0 * step, 4.8, 0.05);
+        }
         let back = mean_opacities(streaks(method, 50.0), &[50.0, 20.0, rates[30]]);
         assert_eq!(back[2], opacities[30], "{method:?}: on its way back it is the same rain");
     }

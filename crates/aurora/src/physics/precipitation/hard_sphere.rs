@@ -339,8 +339,8 @@ mod tests {
         };
         let high = |values: &Vec<f64>| values.iter().filter(|value| **value > 150.0).count() as f64;
         let lowest = |values: &Vec<f64>| values[values.len() - 1];
-        type Statistic<'a> = (&'a str, &'a dyn Fn(&Vec<f64>) -> f64);
-        let statistics: [Statistic; 4] =
+        type Statistic<'a> = &'a dyn Fn(&Vec<f64>) -> f64;
+        let statistics: [(&str, Statistic<'_>); 4] =
             [("mean", &mean), ("deviation", &deviation), ("above 150 km", &high), ("lowest", &lowest)];
         for (name, statistic) in statistics {
             let [by_steps, by_columns] = [&stepped, &sampled].map(|electrons| {

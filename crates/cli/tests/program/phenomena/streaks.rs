@@ -120,7 +120,8 @@ fn the_papers_textures_are_lines_of_two_diameters_over_the_velocity() {
     let scale = number(&entry["opacity_scale"]) / 255.0;
     let sum: f64 = png.bytes.iter().map(|code| f64::from(*code) * scale).sum();
     let expected = drops.len() as f64 * opacity * length * 512.0;
-    assert!((0.97..1.005).contains(&(sum / expected)), "{sum} {expected}");
+    // Up to 3 % less, where streaks cross.
+    assert!((-0.03..0.005).contains(&(sum / expected - 1.0)), "{sum} {expected}");
 }
 
 #[test]

@@ -130,6 +130,7 @@ fn flame_passes_into_dark_smoke_above_it() {
     let mean = |rows: &[[f32; 3]], k: usize| rows.iter().map(|row| row[k]).sum::<f32>() / rows.len() as f32;
     let (smoke, flame) = (&rows[top..top + quarter], &rows[bottom - quarter..=bottom]);
     assert!(mean(flame, 0) > 30.0 * mean(smoke, 0), "{} {}", mean(flame, 0), mean(smoke, 0));
+    bansho_base::assert_measured!("light of flame over smoke", f64::from(mean(flame, 0) / mean(smoke, 0)), 610.0, 5.0);
     assert!(mean(smoke, 1) > 0.5 && mean(smoke, 2) > 1.5 * mean(flame, 2), "smoke covers more than the flame");
 }
 
