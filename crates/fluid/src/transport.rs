@@ -152,7 +152,7 @@ impl Carrier<'_> {
         if self.has_floor {
             contents.mirror_at_floor(self.grid);
         }
-        self.euler_step(contents, None, stage, seconds);
+        self.euler_step(contents, false, stage, seconds);
         if self.has_floor {
             stage.mirror_at_floor(self.grid);
         }
@@ -163,12 +163,12 @@ impl Carrier<'_> {
             density: std::mem::take(&mut begin.density),
             quantities: begin.quantities.each_mut().map(std::mem::take),
         };
-        self.euler_step(predicted, Some(()), &mut end, seconds);
+        self.euler_step(predicted, true, &mut end, seconds);
         *begin = end;
     }
 
-    /// One step of Euler's method from `from`. Without `mean` it is written to `to`; with it, `to` becomes the mean of itself and the step.
-    fn euler_step(&self, from: &Contents, mean: Option<()>, to: &mut Contents, seconds: f32) {
+    /// One step of Euler's method from `from`. Without `is_mean` it is written to `to`; with it, `to` becomes the mean of itself and the step.
+    fn euler_step(&self, from: &Contents, is_mean: bool, to: &mut Contents, seconds: f32) {
         let [_, plane, _] = self.grid.strides();
         let level = bansho_base::math::simd::level();
         let [first, second] = &mut to.quantities;
@@ -179,7 +179,7 @@ impl Carrier<'_> {
             if is_inside {
                 let quantities = [first, second];
                 let y = padded_y - GHOST_LAYERS;
-                dispatch!(level, simd => self.layer(simd, from, mean.is_some(), density, quantities, y, seconds));
+                dispatch!(level, simd => self.layer(simd, from, is_mean, density, quantities, y, seconds));
             }
         });
     }

@@ -121,7 +121,7 @@ impl Mixture {
         self.air_density * self.air_temperature_k / temperature_k
     }
 
-    /// Mixture fraction at which only fuel and no air is left; 1.
+    /// Temperature of the sheet without loss of heat, K.
     pub(crate) fn hottest_k(&self) -> f32 {
         self.adiabatic_k(self.stoichiometric)
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     host::{assets::Assets, constructions},
+    math::random::Key,
     parameters::{Auto, Parameter},
 };
 
@@ -45,7 +46,7 @@ impl FlameVolume {
             return Err(VolumeError { key, kind: VolumeErrorKind::LoopJumps { seconds } });
         }
         constructions::count("flame_volume");
-        let key = domain::key(seed, name);
+        let key = Key::new(seed, name);
         let burners = VolumeBurner::list(&parameters, key, assets)?;
         let size = domain::FireSize::new(&burners);
         let coarse_grid = domain::coarse_grid(&parameters, &burners, &size)?;

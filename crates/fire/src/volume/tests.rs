@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bansho_base::{
     host::assets::MemoryAssets,
-    math::{self, DVec3},
+    math::{self, DVec3, random::Key},
     parameters::{Auto, animated::Animated},
     phenomenon::{
         Run, Stepped,
@@ -39,7 +39,7 @@ fn fire(fuel: Fuel, diameter: f64, heat_release_kw: f64, cells: f64) -> FlameVol
 
 /// The gas of a fire on its final grid from the beginning.
 fn simulation(parameters: FlameVolumeParameters, seed: u64) -> Simulation {
-    let key = domain::key(seed, "fire");
+    let key = Key::new(seed, "fire");
     let burners = VolumeBurner::list(&parameters, key, &MemoryAssets::default()).unwrap();
     let size = domain::FireSize::new(&burners);
     let coarse_grid = domain::coarse_grid(&parameters, &burners, &size).unwrap();

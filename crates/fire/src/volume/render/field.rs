@@ -52,8 +52,10 @@ impl GasField {
     pub(crate) fn new(flow: &Flow, active: &ActiveRows, position: DVec3, refinement: usize, least: [f32; 2]) -> Self {
         let grid = Grid { origin: flow.grid.origin + position, ..flow.grid };
         let size = grid.size.map(|cells| cells * refinement);
-        let mixture = refined(flow, active, refinement);
-        let data = point_data(flow, active);
+        let continued = continued_into_solids(flow);
+        let [mixture, deficit] = continued.as_ref().unwrap_or(&flow.contents.quantities);
+        let data = point_data(flow, active, deficit);
+        let mixture = refined(&flow.grid, mixture, active, refinement);
         let blocks = size.map(|points| points.div_ceil(BLOCK));
         let mut field = Self { grid, size, refinement, mixture, data, contents: Vec::new(), blocks, seen_bounds: None };
         field.find_seen_blocks(least);
@@ -195,11 +197,44 @@ fn place(value: f32, count: usize) -> (usize, f32) {
     (below, clamped - below as f32)
 }
 
+/// Mixture fraction and deficit, continued into solids from the gas beside them: the splines around a point at the surface of a solid read cells inside of it, and
+/// a sheet would follow their steps if these held air. `None` without solids.
+fn continued_into_solids(flow: &Flow) -> Option<[Vec<f32>; 2]> {
+    /// Cells that splines and the lookups of rays reach into a solid.
+    const LAYERS: usize = 3;
+    if flow.solids.is_empty() {
+        return None;
+    }
+    let [right, above, behind] = flow.grid.strides();
+    let mut fields = flow.contents.quantities.clone();
+    let mut is_known: Vec<bool> = (0..flow.grid.len()).map(|index| !flow.solids.contains(index)).collect();
+    let mut unknown: Vec<usize> = (0..is_known.len()).filter(|index| !is_known[*index]).collect();
+    for _ in 0..LAYERS {
+        let mut reached = Vec::new();
+        for &index in &unknown {
+            let neighbors =
+                [index - right, index + right, index - above, index + above, index - behind, index + behind];
+            let (mut sums, mut count) = ([0.0; 2], 0.0);
+            for neighbor in neighbors.into_iter().filter(|neighbor| is_known[*neighbor]) {
+                (0..2).for_each(|field| sums[field] += fields[field][neighbor]);
+                count += 1.0;
+            }
+            if count > 0.0 {
+                reached.push((index, sums.map(|sum| sum / count)));
+            }
+        }
+        for (index, values) in reached {
+            (0..2).for_each(|field| fields[field][index] = values[field]);
+            is_known[index] = true;
+        }
+        unknown.retain(|index| !is_known[*index]);
+    }
+    Some(fields)
+}
+
 /// The mixture fraction on a grid of `refinement` (1 or 2) times as many points along each axis.
-fn refined(flow: &Flow, active: &ActiveRows, refinement: usize) -> Vec<f32> {
-    let grid = flow.grid;
+fn refined(grid: &Grid, source: &[f32], active: &ActiveRows, refinement: usize) -> Vec<f32> {
     let [width, _, depth] = grid.size;
-    let source = &flow.contents.quantities[0];
     let fine_width = width * refinement;
     let mut fine = vec![0.0; grid.cells() * refinement * refinement * refinement];
     let layer = fine_width * depth * refinement;
@@ -259,7 +294,7 @@ fn taps(fine: usize) -> (isize, [f32; 4]) {
 }
 
 /// Velocity at the centers of cells, and the deficit of heat.
-fn point_data(flow: &Flow, active: &ActiveRows) -> Vec<PointData> {
+fn point_data(flow: &Flow, active: &ActiveRows, deficit: &[f32]) -> Vec<PointData> {
     let grid = flow.grid;
     let [width, _, depth] = grid.size;
     let strides = grid.strides();
@@ -272,7 +307,7 @@ fn point_data(flow: &Flow, active: &ActiveRows) -> Vec<PointData> {
                     let mean = 0.5 * (flow.velocity[axis][index] + flow.velocity[axis][index + strides[axis]]);
                     if mean.abs() <= FASTEST { mean } else { 0.0 }
                 };
-                data[z * width + x] = [speed(0), speed(1), speed(2), flow.contents.quantities[1][index]];
+                data[z * width + x] = [speed(0), speed(1), speed(2), deficit[index]];
             }
         }
     });

@@ -35,6 +35,8 @@ pub(crate) struct RayMarcher<'a> {
     pub(crate) soot_absorption: f32,
     /// Extinction coefficient of smoke for its mass over that of the gas and the mixture fraction, m^2/kg.
     pub(crate) smoke_extinction: f32,
+    /// Mixture fraction below which no smoke is seen.
+    pub(crate) least_smoke: f32,
     pub(crate) smoke_light: Option<&'a SmokeLight>,
     /// Factor of the blue light.
     pub(crate) blue: f32,
@@ -249,7 +251,8 @@ impl RayMarcher<'_> {
         // Soot that still glows is drawn as such.
         let lean = (2.0 - 2.0 * mixture / stoichiometric).clamp(0.0, 1.0);
         let density = self.mixture.density(self.mixture.temperature_k(mixture, deficit));
-        self.smoke_extinction * density * mixture * if stoichiometric >= 1.0 { 1.0 } else { lean }
+        let seen = (mixture - self.least_smoke).max(0.0);
+        self.smoke_extinction * density * seen * if stoichiometric >= 1.0 { 1.0 } else { lean }
     }
 }
 

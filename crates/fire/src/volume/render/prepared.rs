@@ -40,8 +40,8 @@ const STREAK_CELLS: f64 = 2.5;
 const MAX_TIME_SAMPLES: f64 = 8.0;
 /// Mixture fraction, over the stoichiometric, from which on gas is seen if it has no smoke.
 const LEAST_SEEN: f32 = 0.8;
-/// The same if it has.
-const LEAST_SMOKE: f32 = 0.02;
+/// The same if it has. Less is not drawn, and what is drawn counts from here, so that smoke has no edge where it ends.
+const LEAST_SMOKE: f32 = 0.004;
 
 /// AOVs of a volume flame, in the order of a strip's planes.
 pub(crate) const AOVS: &[AovDescriptor] = &[
@@ -195,6 +195,7 @@ impl<'a> PreparedVolume<'a> {
             black_body: color::black_body(),
             soot_absorption: (self.gas.soot * VISIBLE_SOOT_ABSORPTION * rendering.soot_gain) as f32,
             smoke_extinction: (self.gas.smoke_yield * SMOKE_EXTINCTION * rendering.soot_gain) as f32,
+            least_smoke: self.gas.least_seen()[0],
             smoke_light: self.smoke_light.as_ref(),
             blue: rendering.blue as f32,
             offset_s: (self.view.shutter.middle() - self.gas.time) as f32,

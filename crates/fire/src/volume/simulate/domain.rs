@@ -2,7 +2,7 @@
 
 use bansho_base::{
     host::memory,
-    math::{self, DVec3, random::Key},
+    math::{self, DVec3},
     parameters::Auto,
     world::{air::Air, gravity::STANDARD_GRAVITY},
 };
@@ -144,9 +144,4 @@ fn corners(
         high = DVec3::from(corner);
     }
     Ok([low, high])
-}
-
-/// The key of a flame's random numbers.
-pub(crate) fn key(seed: u64, name: &str) -> Key {
-    Key::new(seed, name)
 }
