@@ -94,6 +94,15 @@ fn of_rain_among_lamps_over_wet_ground() {
 }
 
 #[test]
+fn of_rain_beside_an_obstacle() {
+    // A pixel beside the obstacle's edge must not depend on whether the crop contains other pixels of the edge.
+    let around = "[[obstacle]]\nvisible = true\nposition = [0, 0.4, 0]\n[[light]]\n[[flame_sheet]]\n";
+    for method in ["drops", "billboards", "textures"] {
+        assert_parts_agree(&format!("bansho = 2\n{around}[[rain]]\nmethod = \"{method}\"\n"), 4);
+    }
+}
+
+#[test]
 fn of_auroras() {
     let small = "[[aurora]]\npreroll_s = 0.2\nparticles = { count = 4000 }\nfield = { cells = 96 }\n";
     assert_parts_agree(&format!("bansho = 2\n{small}"), 2);

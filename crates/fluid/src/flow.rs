@@ -158,11 +158,14 @@ impl Flow {
         self.stage = self.contents.clone();
     }
 
-    /// Makes these the solids in the gas.
-    pub fn set_solids(&mut self, occluders: &[Occluder]) {
-        if self.solids.set(&self.grid, occluders) {
+    /// Makes these the solids in the gas. Returns whether they are others than before.
+    pub fn set_solids(&mut self, occluders: &[Occluder]) -> bool {
+        let are_new = self.solids.set(&self.grid, self.settings.has_floor, occluders);
+        if are_new {
+            self.projection.set_solids(&self.solids);
             self.stop_at_walls();
         }
+        are_new
     }
 
     /// Carries density and quantities of the `active` cells for `seconds`.

@@ -21,11 +21,11 @@ pub struct Grid {
 
 impl Grid {
     /// The grid of at least `size` cells of side `spacing` (m) whose corner with the smallest coordinates is `origin`. The number of cells along x is raised to a
-    /// multiple of [`LANES`], that along z to an even number.
+    /// multiple of [`LANES`], that along z to an even number, both to products of small primes, whose Fourier transforms are fast.
     #[must_use]
     pub fn new(size: [usize; 3], spacing: f64, origin: DVec3) -> Self {
         let [x, y, z] = size.map(|cells| cells.max(4));
-        Self { size: [x.next_multiple_of(LANES), y, z.next_multiple_of(2)], spacing, origin }
+        Self { size: [transformable(x, LANES), y, transformable(z, 2)], spacing, origin }
     }
 
     /// Number of cells.
@@ -87,6 +87,16 @@ impl Grid {
         (point - self.origin) / self.spacing
     }
 
+    /// The cells that share a face with a cell.
+    pub(crate) fn neighbors(&self, cell: [usize; 3]) -> impl Iterator<Item = [usize; 3]> + use<> {
+        let size = self.size;
+        (0..6).filter_map(move |number| {
+            let (axis, mut near) = (number / 2, cell);
+            near[axis] = if number % 2 == 0 { cell[axis].checked_sub(1)? } else { cell[axis] + 1 };
+            (near[axis] < size[axis]).then_some(near)
+        })
+    }
+
     /// The rows of a layer of cells: for each, its z and the place of its first cell.
     pub fn rows(&self, y: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
         let grid = *self;
@@ -94,9 +104,29 @@ impl Grid {
     }
 }
 
+/// The least multiple of `step` from `count` on that has no prime factor above 7.
+fn transformable(count: usize, step: usize) -> usize {
+    let is_smooth = |count: &usize| {
+        let mut rest = *count;
+        for factor in [2, 3, 5, 7] {
+            while rest.is_multiple_of(factor) {
+                rest /= factor;
+            }
+        }
+        rest == 1
+    };
+    (count.div_ceil(step)..).map(|times| times * step).find(is_smooth).unwrap_or(count)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_are_products_of_small_primes() {
+        assert_eq!([1, 17, 169, 175, 200].map(|x| transformable(x, 16)), [16, 32, 192, 192, 224]);
+        assert_eq!([4, 75, 76, 89, 97].map(|z| transformable(z, 2)), [4, 80, 80, 90, 98]);
+    }
 
     #[test]
     fn neighbors_are_a_stride_apart() {

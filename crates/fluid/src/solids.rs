@@ -2,9 +2,13 @@
 
 use bansho_base::{host::parallel::prelude::*, math::DVec3, phenomenon::surroundings::Occluder};
 
-use crate::grid::{GHOST_LAYERS, Grid};
+use crate::{
+    grid::{GHOST_LAYERS, Grid},
+    sides::Side,
+};
 
-/// The cells of a grid whose centers are in solids. Gas slides along them without friction.
+/// The cells of a grid whose centers are in solids, and those from which solids cut all ways out, in which nothing can flow. Gas slides along them without
+/// friction.
 #[derive(Clone, Debug, Default)]
 pub struct Solids {
     occluders: Vec<Occluder>,
@@ -40,8 +44,8 @@ impl Solids {
         (self.count > 0).then_some(self.open_faces[axis].as_slice())
     }
 
-    /// Makes these the solids. Returns whether they are others than before.
-    pub fn set(&mut self, grid: &Grid, occluders: &[Occluder]) -> bool {
+    /// Makes these the solids, in a grid whose bottom is a floor or open. Returns whether they are others than before.
+    pub fn set(&mut self, grid: &Grid, has_floor: bool, occluders: &[Occluder]) -> bool {
         if Occluder::are_same(&self.occluders, occluders) {
             return false;
         }
@@ -63,6 +67,7 @@ impl Solids {
                 }
             }
         });
+        self.fill_cavities(grid, has_floor);
         self.count = self.is_solid.iter().filter(|is_solid| **is_solid).count();
         for (axis, faces) in self.open_faces.iter_mut().enumerate() {
             let stride = grid.strides()[axis];
@@ -74,6 +79,25 @@ impl Solids {
             }
         }
         true
+    }
+
+    /// Makes cells solid that no way connects with an open side: what expands there could go nowhere.
+    fn fill_cavities(&mut self, grid: &Grid, has_floor: bool) {
+        let mut is_reached = self.is_solid.clone();
+        let sides = Side::open(has_floor).flat_map(|side| side.faces(grid)).map(|face| face.position);
+        let mut reached: Vec<[usize; 3]> = sides.collect();
+        while let Some(cell) = reached.pop() {
+            if !std::mem::replace(&mut is_reached[grid.index(cell)], true) {
+                reached.extend(grid.neighbors(cell).filter(|near| !is_reached[grid.index(*near)]));
+            }
+        }
+        for y in 0..grid.size[1] {
+            for (_, row) in grid.rows(y) {
+                let width = grid.size[0];
+                let cells = self.is_solid[row..row + width].iter_mut().zip(&is_reached[row..row + width]);
+                cells.for_each(|(is_solid, is_reached)| *is_solid |= !is_reached);
+            }
+        }
     }
 }
 
@@ -88,5 +112,41 @@ fn reaches(grid: &Grid, occluder: &Occluder) -> bool {
             (deepest - *point).dot(*normal) < 0.0
         }
         (None, _) => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four walls and a lid of a box without a bottom, 0.1 m thick.
+    fn cup() -> Vec<Occluder> {
+        let wall = |center: [f64; 3], size: [f64; 3]| Occluder::Cuboid {
+            center: DVec3::from(center),
+            half_extents: DVec3::from(size) / 2.0,
+            rotation: bansho_base::math::DQuat::IDENTITY,
+        };
+        vec![
+            wall([-0.35, 0.4, 0.0], [0.1, 0.8, 0.8]),
+            wall([0.35, 0.4, 0.0], [0.1, 0.8, 0.8]),
+            wall([0.0, 0.4, -0.35], [0.8, 0.8, 0.1]),
+            wall([0.0, 0.4, 0.35], [0.8, 0.8, 0.1]),
+            wall([0.0, 0.75, 0.0], [0.8, 0.1, 0.8]),
+        ]
+    }
+
+    #[test]
+    fn what_no_gas_can_leave_is_solid() {
+        let grid = Grid::new([32, 24, 32], 0.05, DVec3::new(-0.8, 0.0, -0.8));
+        let middle = grid.index([16, 4, 16]);
+        let mut solids = Solids::default();
+        solids.set(&grid, false, &cup());
+        assert!(!solids.contains(middle), "open below");
+        let mut solids = Solids::default();
+        solids.set(&grid, true, &cup());
+        assert!(solids.contains(middle), "on the floor");
+        let mut solids = Solids::default();
+        solids.set(&grid, true, &cup()[..4]);
+        assert!(!solids.contains(middle), "open above");
     }
 }

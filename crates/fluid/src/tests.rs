@@ -187,6 +187,28 @@ fn gas_flows_around_a_ball_and_not_into_it() {
     assert!(worst < 0.02, "{worst}");
 }
 
+/// Two walls a cell thick with a gap between them: the solution of the empty box, from which the iteration begins, knows nothing of such walls.
+#[test]
+fn no_gas_is_lost_between_thin_walls() {
+    let wind = [1.0, 0.0, 0.5];
+    let grid = Grid::new([32, 24, 32], 0.05, DVec3::new(-0.8, 0.0, -0.8));
+    let mut flow = Flow::new(grid, settings(true, wind));
+    let walls = [-0.175, 0.125].map(|x| Occluder::Cuboid {
+        center: DVec3::new(x, 0.35, 0.0),
+        half_extents: DVec3::new(0.03, 0.35, 0.4),
+        rotation: bansho_base::math::DQuat::IDENTITY,
+    });
+    flow.set_solids(&walls);
+    for _ in 0..20 {
+        step(&mut flow, wind, 0.01);
+    }
+    assert!(flow.solids.cells() > 400);
+    let worst = largest_divergence(&flow) * 0.05;
+    assert!(worst < 0.02, "{worst}");
+    let between = flow.velocity[0][grid.index([15, 4, 16])];
+    assert!(between.abs() < 0.1, "{between}");
+}
+
 #[test]
 fn threads_do_not_change_a_bit() {
     let results: Vec<Vec<u32>> = [1, 3]

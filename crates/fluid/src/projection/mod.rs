@@ -1,5 +1,6 @@
 //! The pressure that makes the divergence of the velocity what the expansion of the gas asks for.
 
+mod capacitance;
 mod poisson;
 mod transform;
 
@@ -16,22 +17,20 @@ use crate::{
     sides::{Ambient, Side, SideFace, side_pressure},
     solids::Solids,
 };
-use poisson::PoissonSolver;
-
-/// Largest residual of the equation with solids, relative to its right side.
-const TOLERANCE: f64 = 1e-3;
-/// Most iterations with solids.
-const MAX_ITERATIONS: usize = 30;
+use capacitance::SolidBoundary;
+use poisson::{PoissonSolver, Slab};
 
 /// Solver of the pressure of a grid, with its buffers.
 pub(crate) struct Projection {
     grid: Grid,
     has_floor: bool,
     solver: PoissonSolver,
+    /// All layers.
+    whole: Slab,
+    /// Where gas touches solids.
+    boundary: Option<SolidBoundary>,
     /// Source, then solution, without ghost cells.
     values: Vec<f32>,
-    /// For solids: residual, direction, its image under the operator, and the pressure.
-    iteration: [Vec<f32>; 4],
 }
 
 /// What a projection is told besides the velocity.
@@ -47,22 +46,22 @@ pub(crate) struct Constraint<'a> {
 
 impl Projection {
     pub(crate) fn new(grid: Grid, has_floor: bool) -> Self {
-        Self {
-            grid,
-            has_floor,
-            solver: PoissonSolver::new(grid, has_floor),
-            values: vec![0.0; grid.cells()],
-            iteration: std::array::from_fn(|_| Vec::new()),
-        }
+        let solver = PoissonSolver::new(grid, has_floor);
+        let whole = solver.slab(0..grid.size[1]);
+        Self { grid, has_floor, solver, whole, boundary: None, values: vec![0.0; grid.cells()] }
+    }
+
+    /// Makes these the solids in the gas.
+    pub(crate) fn set_solids(&mut self, solids: &Solids) {
+        self.boundary = if solids.is_empty() { None } else { SolidBoundary::new(&self.solver, self.grid, solids) };
     }
 
     /// Finds the pressure, which is written to the cells of `pressure` (Pa), and subtracts its gradient from the velocity.
     pub(crate) fn project(&mut self, velocity: &mut Velocity, pressure: &mut [f32], constraint: &Constraint) {
         self.set_source(velocity, constraint);
-        if constraint.solids.is_empty() {
-            self.solver.solve(&mut self.values);
-        } else {
-            self.solve_around_solids(constraint.solids, pressure);
+        match &mut self.boundary {
+            None => self.solver.solve(&self.whole, &mut self.values),
+            Some(boundary) => boundary.solve(&self.solver, &self.whole, &mut self.values, pressure),
         }
         self.copy_to(pressure);
         self.subtract_gradient(velocity, pressure, constraint);
@@ -131,124 +130,6 @@ impl Projection {
             });
         }
     }
-
-    /// Conjugate gradients with the solver of the box without solids as preconditioner (Hestenes and Stiefel 1952), from the pressure of the last step on.
-    fn solve_around_solids(&mut self, solids: &Solids, last: &[f32]) {
-        let cells = self.values.len();
-        let mut buffers = std::mem::take(&mut self.iteration);
-        buffers.iter_mut().for_each(|buffer| buffer.resize(cells, 0.0));
-        let [residual, direction, image, pressure] = &mut buffers;
-        residual.copy_from_slice(&self.values);
-        let target = TOLERANCE * TOLERANCE * dot(residual, residual);
-        for y in 0..self.grid.size[1] {
-            for (z, row) in self.grid.rows(y) {
-                let width = self.grid.size[0];
-                let at = (y * self.grid.size[2] + z) * width;
-                pressure[at..at + width].copy_from_slice(&last[row..row + width]);
-            }
-        }
-        self.apply(solids, pressure, image);
-        subtract(residual, image, 1.0);
-        let mut steepness = 0.0;
-        for iteration in 0..MAX_ITERATIONS {
-            if dot(residual, residual) <= target {
-                break;
-            }
-            self.values.copy_from_slice(residual);
-            self.solver.solve(&mut self.values);
-            self.clear_solids(solids);
-            let next = dot(residual, &self.values);
-            let weight = if iteration == 0 || steepness == 0.0 { 0.0 } else { next / steepness };
-            steepness = next;
-            let weight = weight as f32;
-            direction.par_chunks_mut(CHUNK).zip(self.values.par_chunks(CHUNK)).for_each(|(direction, values)| {
-                direction.iter_mut().zip(values).for_each(|(d, v)| *d = v + weight * *d);
-            });
-            self.apply(solids, direction, image);
-            let curvature = dot(direction, image);
-            if curvature == 0.0 || !curvature.is_finite() {
-                break;
-            }
-            let length = (steepness / curvature) as f32;
-            subtract(pressure, direction, -length);
-            subtract(residual, image, length);
-        }
-        self.values.copy_from_slice(pressure);
-        self.iteration = buffers;
-    }
-
-    /// The seven-point operator around solids, through whose faces there is no gradient.
-    fn apply(&self, solids: &Solids, pressure: &[f32], image: &mut [f32]) {
-        let [width, height, depth] = self.grid.size;
-        let plane = width * depth;
-        let per_area = (1.0 / (self.grid.spacing * self.grid.spacing)) as f32;
-        let strides = self.grid.strides();
-        image.par_chunks_mut(plane).enumerate().for_each(|(y, image)| {
-            for (z, row) in self.grid.rows(y) {
-                for x in 0..width {
-                    let (cell, at) = (row + x, (y * depth + z) * width + x);
-                    let place = z * width + x;
-                    if solids.contains(cell) {
-                        image[place] = 0.0;
-                        continue;
-                    }
-                    let here = pressure[at];
-                    let mut sum = 0.0;
-                    let mut add = |is_inside: bool, neighbor: usize, stays: bool, value: usize| {
-                        if !is_inside {
-                            sum -= if stays { 0.0 } else { 2.0 * here };
-                        } else if !solids.contains(neighbor) {
-                            sum += pressure[value] - here;
-                        }
-                    };
-                    add(x > 0, cell - strides[0], false, at.wrapping_sub(1));
-                    add(x + 1 < width, cell + strides[0], false, at + 1);
-                    add(z > 0, cell - strides[2], false, at.wrapping_sub(width));
-                    add(z + 1 < depth, cell + strides[2], false, at + width);
-                    add(y > 0, cell - strides[1], self.has_floor, at.wrapping_sub(plane));
-                    add(y + 1 < height, cell + strides[1], false, at + plane);
-                    image[place] = per_area * sum;
-                }
-            }
-        });
-    }
-
-    fn clear_solids(&mut self, solids: &Solids) {
-        let grid = self.grid;
-        let plane = grid.size[0] * grid.size[2];
-        self.values.par_chunks_mut(plane).enumerate().for_each(|(y, values)| {
-            for (z, row) in grid.rows(y) {
-                for x in (0..grid.size[0]).filter(|x| solids.contains(row + x)) {
-                    values[z * grid.size[0] + x] = 0.0;
-                }
-            }
-        });
-    }
-}
-
-/// Values per task of sums over all cells.
-const CHUNK: usize = 1 << 14;
-
-/// Inner product. Sums of chunks are added in their order, so that the result does not depend on threads.
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let sums = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| {
-        let mut lanes = [0.0_f64; LANES];
-        for (a, b) in a.chunks(LANES).zip(b.chunks(LANES)) {
-            for ((sum, a), b) in lanes.iter_mut().zip(a).zip(b) {
-                *sum += f64::from(*a) * f64::from(*b);
-            }
-        }
-        lanes.iter().sum::<f64>()
-    });
-    let sums: Vec<f64> = sums.collect();
-    sums.iter().sum()
-}
-
-/// `a -= factor * b`.
-fn subtract(a: &mut [f32], b: &[f32], factor: f32) {
-    a.par_chunks_mut(CHUNK)
-        .zip(b.par_chunks(CHUNK))
-        .for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= factor * b));
 }
 
 fn pressure_on(side: Side, speed: f32, ambient: &Ambient) -> f32 {

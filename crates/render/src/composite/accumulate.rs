@@ -7,6 +7,8 @@ use bansho_base::{
 };
 use fearless_simd::{Level, dispatch};
 
+use super::hiding::is_partly_covered;
+
 /// The composite of a strip of the picture from the camera to some depth. Planes are stored in rows.
 #[derive(Default)]
 pub(crate) struct Accumulator {
@@ -122,18 +124,9 @@ impl Accumulator {
         }
     }
 
-    /// Mixes with another composite of some of its pixels: `own_weight` (column and row in the picture) is its own weight, the other's is the rest. AOVs
-    /// stay.
+    /// Mixes with another composite, over some of its pixels: `own_weight` (column and row in the picture) is its own weight, the other's is the rest. Pixels
+    /// of which one composite has all stay as they are, so that no pixel depends on how large the other one is. AOVs stay.
     pub(crate) fn mix(&mut self, other: &Self, own_weight: impl Fn(usize, usize) -> f32) {
-        self.mix_where(other, own_weight, |_| true);
-    }
-
-    /// [Mixes](Self::mix) those pixels of which both composites have a share.
-    pub(crate) fn mix_partly(&mut self, other: &Self, own_weight: impl Fn(usize, usize) -> f32) {
-        self.mix_where(other, own_weight, |weight| weight > 0.0 && weight < 1.0);
-    }
-
-    fn mix_where(&mut self, other: &Self, own_weight: impl Fn(usize, usize) -> f32, is_mixed: impl Fn(f32) -> bool) {
         if other.absorbs {
             self.start_absorbing();
         }
@@ -141,7 +134,7 @@ impl Accumulator {
         for from in 0..rect.width * rect.height {
             let [x, y] = [rect.x + from % rect.width, rect.y + from / rect.width];
             let (to, weight) = ((y - self.rect.y) * self.rect.width + x - self.rect.x, own_weight(x, y));
-            if !is_mixed(weight) {
+            if !is_partly_covered(weight) {
                 continue;
             }
             let transmittance = other.transmittance_at(from);
@@ -326,9 +319,9 @@ mod tests {
     #[test]
     fn only_pixels_that_are_covered_partly_are_mixed() {
         let mut own = composite(4.0, Some(0.5), 2.0);
-        own.mix_partly(&composite(8.0, None, 3.0), |x, _| if x == 6 { 1.0 } else { 0.0 });
+        own.mix(&composite(8.0, None, 3.0), |x, _| if x == 6 { 1.0 } else { 0.0 });
         assert_eq!((own.color[0][1], own.transmittance_at(1)), (4.0, [0.5; 3]));
-        own.mix_partly(&composite(8.0, None, 3.0), |_, _| 0.25);
+        own.mix(&composite(8.0, None, 3.0), |_, _| 0.25);
         assert_eq!((own.color[0][1], own.transmittance_at(1)), (7.0, [0.875; 3]));
     }
 }

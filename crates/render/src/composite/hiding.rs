@@ -90,7 +90,7 @@ impl HidingDepth {
             return edges;
         }
         for x in rect.x..rect.right() {
-            if !(rect.y..rect.bottom()).any(|y| (0.001..0.999).contains(&self.coverage(x, y))) {
+            if !(rect.y..rect.bottom()).any(|y| is_partly_covered(self.coverage(x, y))) {
                 continue;
             }
             match edges.last_mut() {
@@ -100,6 +100,11 @@ impl HidingDepth {
         }
         edges
     }
+}
+
+/// Whether a pixel with this coverage by opaque surfaces shows both them and what is beside them.
+pub(crate) fn is_partly_covered(coverage: f32) -> bool {
+    coverage > 0.0 && coverage < 1.0
 }
 
 /// Depths beyond which a phenomenon is hidden.

@@ -98,7 +98,7 @@ impl Composition<'_> {
             self.draw_moments(level, edge_hull, &members, OpaqueSurfacesAre::LeftOut(&edges), pass, strips, uncovered);
             for (index, (moment, uncovered)) in covered.iter_mut().zip(uncovered).enumerate() {
                 let hiding = hiding[index * hiding.len() / count];
-                moment.mix_partly(uncovered, |x, y| hiding.coverage(x, y));
+                moment.mix(uncovered, |x, y| hiding.coverage(x, y));
             }
         }
         mean.reset(rect, self.layer_count(), &[]);

@@ -1,14 +1,14 @@
 //! Burners: how much gas enters which cell.
 
 use bansho_base::{
-    host::assets::Assets,
+    host::{assets::Assets, parallel::prelude::*},
     math::{
         DVec3,
         random::{Key, Purpose},
     },
     noise::{Coordinate, Fractal, Noise, VARIANCE},
 };
-use bansho_fluid::{Grid, Solids};
+use bansho_fluid::{Flow, Grid, Solids};
 
 use crate::{
     particles::{BurnerParameters, FlameParticlesParameters, simulate::burner::Burner},
@@ -96,40 +96,80 @@ impl VolumeBurner {
         [first + self.surface.extent[0], last + self.surface.extent[1]]
     }
 
-    /// The cells into which it emits at `t`, and the share of its gas of each. Cells of the same index are listed once, in rising order.
-    pub(crate) fn cells(&self, grid: &Grid, solids: &Solids, key: Key, t: f64, unevenness: f64) -> Vec<(usize, f32)> {
+    /// The cells into which it emits at `t`. Cells of the same index are listed once, in rising order.
+    fn cells(&self, grid: &Grid, solids: &Solids, key: Key, t: f64) -> Vec<BurnerCell> {
         let area = grid.spacing * grid.spacing;
         let count = (SAMPLES_PER_CELL * self.area_m2 / area).clamp(64.0, MAX_SAMPLES) as u64;
-        let noise_scale = 1.0 / (PATCH * self.diameter);
-        let noise_time = t / (PATCH_LIFETIME_S * self.diameter.sqrt());
-        let amplitude = unevenness / bansho_base::math::sqrt(VARIANCE[2] * 5.0 / 9.0);
-        let mut samples: Vec<(usize, f32)> = Vec::with_capacity(count as usize);
-        for id in 0..count {
+        let samples = (0..count).into_par_iter().filter_map(|id| {
             let place = self.surface.spawn_point(key, id, t);
             // Half a cell along the normal, out of what burns.
             let point = place.position + place.direction * (0.5 * grid.spacing);
-            let Some(index) = free_cell(grid, solids, point, place.direction) else { continue };
-            let coordinates = [
-                place.position.x * noise_scale,
-                place.position.y * noise_scale,
-                place.position.z * noise_scale,
-                noise_time,
-            ];
-            let noise =
-                self.noise.as_ref().map_or(0.0, |noise| f64::from(noise.at(coordinates.map(Coordinate::from_f64))));
-            samples.push((index, (1.0 + amplitude * noise).clamp(0.0, 3.0) as f32));
-        }
-        samples.sort_unstable_by_key(|(index, _)| *index);
-        let mut cells: Vec<(usize, f32)> = Vec::new();
-        for (index, weight) in samples {
-            match cells.last_mut() {
-                Some((last, sum)) if *last == index => *sum += weight,
-                _ => cells.push((index, weight)),
-            }
-        }
-        let total: f32 = cells.iter().map(|(_, weight)| *weight).sum();
-        cells.iter_mut().for_each(|(_, weight)| *weight /= total.max(f32::MIN_POSITIVE));
-        cells
+            Some((free_cell(grid, solids, point, place.direction)?, place.position))
+        });
+        let mut samples: Vec<(usize, DVec3)> = samples.collect();
+        samples.sort_by_key(|(index, _)| *index);
+        let cells = samples.chunk_by(|(index, _), (next, _)| index == next).map(|samples| BurnerCell {
+            index: samples[0].0,
+            samples: samples.len() as f32,
+            middle: samples.iter().map(|(_, position)| *position).sum::<DVec3>() / samples.len() as f64,
+        });
+        cells.collect()
+    }
+
+    /// The share of its gas of each of its cells at `t`.
+    fn shares(&self, cells: &[BurnerCell], t: f64, unevenness: f64) -> Vec<(usize, f32)> {
+        let noise_scale = 1.0 / (PATCH * self.diameter);
+        let noise_time = t / (PATCH_LIFETIME_S * bansho_base::math::sqrt(self.diameter));
+        let amplitude = unevenness / bansho_base::math::sqrt(VARIANCE[2] * 5.0 / 9.0);
+        let weights = cells.iter().map(|cell| {
+            let [x, y, z] = (cell.middle * noise_scale).to_array();
+            let place = [x, y, z, noise_time].map(Coordinate::from_f64);
+            let noise = self.noise.as_ref().map_or(0.0, |noise| f64::from(noise.at(place)));
+            (cell.index, cell.samples * (1.0 + amplitude * noise).clamp(0.0, 3.0) as f32)
+        });
+        let mut shares: Vec<(usize, f32)> = weights.collect();
+        let total: f32 = shares.iter().map(|(_, weight)| *weight).sum();
+        shares.iter_mut().for_each(|(_, weight)| *weight /= total.max(f32::MIN_POSITIVE));
+        shares
+    }
+}
+
+/// A cell into which a burner emits.
+#[derive(Clone, Copy, Debug)]
+struct BurnerCell {
+    index: usize,
+    /// How many samples of the burner's surface are in it.
+    samples: f32,
+    /// The mean of their positions, m.
+    middle: DVec3,
+}
+
+/// The cells of all burners, which stay the same while burners, grid and solids do.
+#[derive(Debug, Default)]
+pub(crate) struct BurnerCells(Vec<Option<(DVec3, Vec<BurnerCell>)>>);
+
+impl BurnerCells {
+    /// Forgets them: grid or solids have changed.
+    pub(crate) fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// The cells into which burner `number` emits at `t`, with the share of its gas of each.
+    pub(crate) fn shares(
+        &mut self,
+        number: usize,
+        burner: &VolumeBurner,
+        flow: &Flow,
+        key: Key,
+        t: f64,
+        unevenness: f64,
+    ) -> Vec<(usize, f32)> {
+        self.0.resize_with(self.0.len().max(number + 1), || None);
+        let position = DVec3::from(burner.parameters.position.at(t));
+        let kept = self.0[number].take().filter(|(at, _)| *at == position);
+        let (_, cells) =
+            self.0[number].insert(kept.unwrap_or_else(|| (position, burner.cells(&flow.grid, &flow.solids, key, t))));
+        burner.shares(cells, t, unevenness)
     }
 }
 

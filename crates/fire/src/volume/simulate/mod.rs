@@ -14,7 +14,7 @@ use super::{
     fuel::{FuelProperties, Mixture, soot_profile},
     parameters::FlameVolumeParameters,
 };
-use burners::VolumeBurner;
+use burners::{BurnerCells, VolumeBurner};
 use domain::FireSize;
 
 pub(crate) mod burners;
@@ -84,6 +84,8 @@ pub(crate) struct Simulation {
     /// Factor of the emission of soot, so that the fire radiates the fraction of its heat that its fuel radiates.
     pub(crate) emission_factor: f32,
     pub(crate) figures: VolumeFigures,
+    /// Of the grid and the solids as they are.
+    burner_cells: BurnerCells,
 }
 
 impl Simulation {
@@ -101,6 +103,7 @@ impl Simulation {
             mixture,
             emission_factor: 1.0,
             figures: VolumeFigures::default(),
+            burner_cells: BurnerCells::default(),
         }
     }
 
@@ -136,12 +139,15 @@ impl Simulation {
     pub(crate) fn step(&mut self, time: f64, surroundings: &Surroundings) {
         if self.is_coarse() && time >= self.shared.refined_from {
             self.flow = self.flow.refined();
+            self.burner_cells.clear();
             self.restore_active();
         }
         let origin = DVec3::from(self.shared.parameters.position);
         let center = origin + 0.5 * (self.flow.grid.origin + self.flow.grid.far_corner());
         let occluders = moved(&surroundings.others.occluders, origin);
-        self.flow.set_solids(&occluders);
+        if self.flow.set_solids(&occluders) {
+            self.burner_cells.clear();
+        }
         let mut remaining = self.shared.parameters.step_s;
         let mut steps = 0;
         while remaining > 1e-9 && steps < MAX_STEPS {
@@ -174,14 +180,15 @@ impl Simulation {
         let SimulationConstants { burners, fuel, key, parameters, .. } = &*self.shared;
         let mut sources = Vec::new();
         let mut heat = 0.0;
-        for burner in burners {
+        for (number, burner) in burners.iter().enumerate() {
             let flow = burner.parameters.flow.at(time).max(0.0);
             if flow > 0.0 {
                 let kilowatts = burner.heat_release_kw * flow;
                 let mass = (kilowatts * 1e3 / fuel.heat_of_combustion) as f32;
                 heat += kilowatts;
-                let cells = burner.cells(&self.flow.grid, &self.flow.solids, *key, time, parameters.gas.unevenness);
-                sources.extend(cells.into_iter().map(|(index, share)| (index, mass * share)));
+                let unevenness = parameters.gas.unevenness;
+                let shares = self.burner_cells.shares(number, burner, &self.flow, *key, time, unevenness);
+                sources.extend(shares.into_iter().map(|(index, share)| (index, mass * share)));
             }
         }
         self.figures.heat_release_kw = heat;
