@@ -52,43 +52,50 @@ impl SineTransform {
     /// Coefficients of two rows. Value `j` of the first is `row[j * stride]`, that of the second `row[offset + j * stride]`.
     pub(crate) fn analyze(&self, row: &mut [f32], offset: usize, stride: usize, scratch: &mut TransformScratch) {
         let length = self.twiddles.len();
-        let at = |j: usize| Complex::new(row[j * stride], row[offset + j * stride]);
+        let values = &mut scratch.values[..length];
         // Every other value changes its sign, which turns sines into cosines; even places come first, odd ones backward from the end.
-        for j in 0..length.div_ceil(2) {
-            scratch.values[j] = at(2 * j);
+        let (even, odd) = values.split_at_mut(length.div_ceil(2));
+        for (j, value) in even.iter_mut().enumerate() {
+            *value = Complex::new(row[2 * j * stride], row[offset + 2 * j * stride]);
         }
-        for j in 0..length / 2 {
-            scratch.values[length - 1 - j] = -at(2 * j + 1);
+        for (j, value) in odd.iter_mut().rev().enumerate() {
+            *value = -Complex::new(row[(2 * j + 1) * stride], row[offset + (2 * j + 1) * stride]);
         }
-        self.forward.process_with_scratch(&mut scratch.values, &mut scratch.inner);
-        for k in 0..length {
-            let (value, mirror) = (scratch.values[k], scratch.values[(length - k) % length].conj());
+        self.forward.process_with_scratch(values, &mut scratch.inner);
+        let mut store = |k: usize, value: Complex<f32>, mirror: Complex<f32>| {
             let twiddle = self.twiddles[k];
-            let (first, second) = (value + mirror, value - mirror);
+            let (first, second) = (value + mirror.conj(), value - mirror.conj());
             row[k * stride] = 0.5 * (twiddle.re * first.re - twiddle.im * first.im);
             // The spectrum of the second row is the difference over 2 i.
             row[offset + k * stride] = 0.5 * (twiddle.re * second.im + twiddle.im * second.re);
+        };
+        store(0, values[0], values[0]);
+        for k in 1..length {
+            store(k, values[k], values[length - k]);
         }
     }
 
     /// The two rows of these coefficients.
     pub(crate) fn synthesize(&self, row: &mut [f32], offset: usize, stride: usize, scratch: &mut TransformScratch) {
         let length = self.twiddles.len();
-        for k in 0..length {
-            let [first, second] = [0, offset].map(|start| {
-                let mirror = if k == 0 { 0.0 } else { row[start + (length - k) * stride] };
-                Complex::new(row[start + k * stride], -mirror)
-            });
-            let both = Complex::new(first.re - second.im, first.im + second.re);
-            scratch.values[k] = both * self.twiddles[k].conj();
+        let values = &mut scratch.values[..length];
+        values[0] = Complex::new(row[0], row[offset]) * self.twiddles[0].conj();
+        for k in 1..length {
+            let [own, mirror] = [k * stride, (length - k) * stride];
+            // The first row and i times the second, each a coefficient less i times its mirror.
+            let both = Complex::new(row[own] + row[offset + mirror], row[offset + own] - row[mirror]);
+            values[k] = both * self.twiddles[k].conj();
         }
-        self.inverse.process_with_scratch(&mut scratch.values, &mut scratch.inner);
+        self.inverse.process_with_scratch(values, &mut scratch.inner);
         let scale = 1.0 / length as f32;
-        for j in 0..length {
-            let (source, sign) = if j % 2 == 0 { (j / 2, scale) } else { (length - 1 - j / 2, -scale) };
-            let value = scratch.values[source] * sign;
-            row[j * stride] = value.re;
-            row[offset + j * stride] = value.im;
+        let (even, odd) = values.split_at(length.div_ceil(2));
+        for (j, value) in even.iter().enumerate() {
+            row[2 * j * stride] = value.re * scale;
+            row[offset + 2 * j * stride] = value.im * scale;
+        }
+        for (j, value) in odd.iter().rev().enumerate() {
+            row[(2 * j + 1) * stride] = value.re * -scale;
+            row[offset + (2 * j + 1) * stride] = value.im * -scale;
         }
     }
 }
