@@ -91,13 +91,13 @@ impl FlameVolumeRun {
         observer: &dyn Observer,
     ) -> Result<PreparedVolume<'a>, Cancelled> {
         let gas = self.rendered_gas(simulation);
-        let refinement = if self.cell_pixels(simulation, view) > 1.0 { 2 } else { 1 };
+        let step = if self.cell_pixels(simulation, view) > 1.0 { 0.5 } else { 1.0 };
         let position = DVec3::from(self.flame.parameters().position);
-        let field = GasField::new(&simulation.flow, &simulation.active, position, refinement, gas.least_seen());
+        let field = GasField::new(&simulation.flow, &simulation.active, position, gas.seen());
         let mut sparks = self.sparks(view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.sorting_depth.total_cmp(&b.sorting_depth));
         let lights = self.publish(view.shutter).lights;
-        PreparedVolume::new(gas, field, &lights, sparks, view, surroundings, observer)
+        PreparedVolume::new(gas, field, step, &lights, sparks, view, surroundings, observer)
     }
 }
 

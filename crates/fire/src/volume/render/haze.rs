@@ -23,7 +23,7 @@ pub(crate) struct HeatHaze {
 
 /// Gas, and how strongly it refracts.
 pub(crate) struct Refraction<'a> {
-    pub(crate) field: &'a GasField,
+    pub(crate) field: &'a GasField<'a>,
     pub(crate) mixture: Mixture,
     pub(crate) gain: f64,
     /// Interval of depth of the gas, m.
@@ -105,7 +105,7 @@ impl Refraction<'_> {
             number += 1.0;
             let mixture = self.field.mixture(place);
             if mixture > 1e-3 {
-                let kelvin = self.mixture.temperature_k(mixture, self.field.data(place)[3]);
+                let kelvin = self.mixture.temperature_k(mixture, self.field.deficit(place));
                 sum += refractivity(f64::from(kelvin)) - air;
             }
         }

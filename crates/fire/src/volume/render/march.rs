@@ -12,22 +12,22 @@ use super::{
 };
 use crate::volume::fuel::Mixture;
 
-/// Length of a step, points of the fine grid.
-const STEP: f32 = 1.0;
 /// Steps that are taken at once through smoke.
-const SMOKE_STRIDE: f64 = 4.0;
+const SMOKE_STRIDE: f64 = 6.0;
+/// Steps along which the light on smoke is that in their middle.
+const LIGHT_STRIDE: f64 = 16.0;
 /// Transmittance below which nothing behind is seen.
 const OPAQUE: f32 = 1e-3;
 /// Luminance of the blue zone where a ray crosses it, cd/m^2.
 const BLUE_LUMINANCE: f32 = 12.0;
 /// Loss of heat at which the zone is dark, K.
 const BLUE_DEFICIT: f32 = 150.0;
-/// Range of Z over Zs in which soot glows; its temperature is that of the nearest value within.
-const GLOWING: [f32; 2] = [1.1, 2.4];
 
 /// What all rays of a frame share.
 pub(crate) struct RayMarcher<'a> {
-    pub(crate) field: &'a GasField,
+    pub(crate) field: &'a GasField<'a>,
+    /// Length of a step, cells.
+    pub(crate) step: f64,
     pub(crate) sheet: &'a SheetTable,
     pub(crate) mixture: Mixture,
     pub(crate) black_body: &'static BlackBody,
@@ -68,7 +68,7 @@ pub(crate) struct Gathered {
     pub(crate) motion: [f32; 4],
 }
 
-/// A ray in the fine grid: `origin + depth * direction`.
+/// A ray in cells: `origin + depth * direction`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
     origin: DVec3,
@@ -79,8 +79,11 @@ pub(crate) struct Ray {
 
 impl Ray {
     pub(crate) fn new(field: &GasField, origin: DVec3, direction: DVec3) -> Self {
-        let scale = field.points_per_meter();
-        Self { origin: field.point_in_grid(origin), direction: direction * scale, stretch: direction.length() }
+        Self {
+            origin: field.point_in_grid(origin),
+            direction: direction / field.grid.spacing,
+            stretch: direction.length(),
+        }
     }
 
     /// The point at a depth, m.
@@ -102,6 +105,7 @@ impl Ray {
 
 impl RayMarcher<'_> {
     /// What a ray gathers between two depths, m: the mean over the exposure.
+    #[inline(always)]
     pub(crate) fn gather(&self, ray: &Ray, range: [f64; 2]) -> Option<Gathered> {
         let [low, high] = self.field.seen_bounds?;
         let corner = |corner: [usize; 3]| DVec3::from(corner.map(|c| c as f64 - 0.5));
@@ -129,18 +133,20 @@ impl RayMarcher<'_> {
     }
 
     /// Steps along a ray through the gas as it is `offset` seconds after its state, which moves for `exposure` seconds.
+    #[inline(always)]
     fn march(&self, ray: &Ray, [near, far]: [f64; 2], offset: f32, exposure: f32) -> Gathered {
         let mut gathered = Gathered { depth: f32::INFINITY, ..Gathered::default() };
         let speed = ray.direction.length();
-        let step = f64::from(STEP) / speed;
+        let step = self.step / speed;
         let meters = (step * ray.stretch) as f32;
-        let points_per_meter = self.field.points_per_meter() as f32;
-        let (displacement, half_streak) = (offset * points_per_meter, 0.5 * exposure * points_per_meter);
+        let cells_per_meter = (1.0 / self.field.grid.spacing) as f32;
+        let (displacement, half_streak) = (offset * cells_per_meter, 0.5 * exposure * cells_per_meter);
         let mut transmittance = 1.0_f32;
         // Steps are multiples of a step from the camera, so that slices do not change them.
         let mut number = (near / step).ceil();
         let mut before: Option<f32> = None;
-        let glowing = GLOWING.map(|relative| relative * self.mixture.stoichiometric);
+        let step_in_cells = (ray.direction * step).as_vec3();
+        let mut lit = LitSmoke { light: self.smoke_light, stride: f64::NAN, radiance: [0.0; 3] };
         while number * step < far {
             let depth = number * step;
             let place = (ray.origin + ray.direction * depth).as_vec3();
@@ -158,7 +164,8 @@ impl RayMarcher<'_> {
                     let stride = (SMOKE_STRIDE - number % SMOKE_STRIDE).min(rest);
                     number += stride;
                     before = None;
-                    self.cross_smoke(place, depth, meters * stride as f32, &mut transmittance, &mut gathered);
+                    let radiance = lit.radiance(ray, step, number);
+                    self.cross_smoke(place, depth, meters * stride as f32, radiance, &mut transmittance, &mut gathered);
                     if transmittance < OPAQUE {
                         break;
                     }
@@ -167,47 +174,46 @@ impl RayMarcher<'_> {
                 BlockContents::Sheet => {}
             }
             number += 1.0;
-            let data = self.field.data(place);
-            let velocity = Vec3::new(data[0], data[1], data[2]);
+            let velocity = self.field.velocity(place);
             let point = place - velocity * displacement;
             let streak = velocity * half_streak;
             let (first, last) = (self.field.mixture(point - streak), self.field.mixture(point + streak));
             let middle = 0.5 * (first + last);
-            let change = before.map_or(0.0, |before| middle - before);
             let previous = before.unwrap_or(middle);
             before = Some(middle);
+            let change = middle - previous;
             let center = middle - 0.5 * change;
             let half_width = 0.5 * (change.abs() + (last - first).abs());
-            let soot = self.sheet.mean_soot(center, half_width);
+            let [soot, soot_mixture] = self.sheet.mean_soot(center, half_width);
             let blue = self.sheet.blue_between(previous, middle);
-            let smoke = self.smoke(center, data[3]);
-            if soot <= 0.0 && blue <= 0.0 && smoke <= 0.0 {
+            if soot <= 0.0 && blue <= 0.0 && center <= self.least_smoke {
                 continue;
             }
+            // Heat is lost where the soot is, which may be anywhere in the step.
+            let way = if change == 0.0 { 1.0 } else { ((soot_mixture - previous) / change).clamp(0.0, 1.0) };
+            let deficit = self.field.deficit(point - step_in_cells * (1.0 - way));
+            let smoke = self.smoke(center, deficit);
             let absorption = self.soot_absorption * soot;
             let tau = (absorption + smoke) * meters;
             let opacity = 1.0 - approximations::exp(-tau);
             let seen = transmittance * opacity;
             if absorption > 0.0 {
-                let kelvin = (self.mixture.adiabatic_k(center.clamp(glowing[0], glowing[1])) - data[3])
-                    .max(self.mixture.air_temperature_k);
+                let kelvin = self.mixture.temperature_k(soot_mixture, deficit);
                 let share = absorption / (absorption + smoke);
                 let luminance = seen * share * approximations::exp(self.black_body.ln_luminance(kelvin));
                 gathered.luminance += luminance;
                 gathered.luminance_kelvin += luminance * kelvin;
-                (0..3).for_each(|c| gathered.motion[c] += luminance * data[c]);
+                (0..3).for_each(|c| gathered.motion[c] += luminance * velocity[c]);
                 gathered.motion[3] += luminance * depth as f32;
             }
-            if smoke > 0.0
-                && let Some(light) = self.smoke_light
-            {
-                let radiance = light.at(place);
+            if smoke > 0.0 {
+                let radiance = lit.radiance(ray, step, number);
                 let share = seen * smoke / (absorption + smoke);
                 (0..3).for_each(|c| gathered.scattered[c] += share * radiance[c]);
             }
             if blue > 0.0 {
                 // Radicals shine where the sheet is fresh and hot; what soot has cooled burns without them.
-                let freshness = (1.0 - data[3] * (1.0 / BLUE_DEFICIT)).clamp(0.0, 1.0);
+                let freshness = (1.0 - deficit * (1.0 / BLUE_DEFICIT)).clamp(0.0, 1.0);
                 gathered.blue += transmittance * blue * freshness * freshness * self.blue * BLUE_LUMINANCE;
             }
             gathered.optical_depth += tau;
@@ -225,17 +231,22 @@ impl RayMarcher<'_> {
 
     /// Adds smoke over a way of that many meters.
     #[inline(always)]
-    fn cross_smoke(&self, place: Vec3, depth: f64, meters: f32, transmittance: &mut f32, gathered: &mut Gathered) {
-        let smoke = self.smoke(self.field.mixture(place), self.field.data(place)[3]);
+    fn cross_smoke(
+        &self,
+        place: Vec3,
+        depth: f64,
+        meters: f32,
+        radiance: [f32; 3],
+        transmittance: &mut f32,
+        gathered: &mut Gathered,
+    ) {
+        let smoke = self.smoke(self.field.mixture(place), self.field.deficit(place));
         let tau = smoke * meters;
         if tau <= 0.0 {
             return;
         }
         let seen = *transmittance * (1.0 - approximations::exp(-tau));
-        if let Some(light) = self.smoke_light {
-            let radiance = light.at(place);
-            (0..3).for_each(|c| gathered.scattered[c] += seen * radiance[c]);
-        }
+        (0..3).for_each(|c| gathered.scattered[c] += seen * radiance[c]);
         gathered.optical_depth += tau;
         gathered.depth = gathered.depth.min(depth as f32);
         *transmittance -= seen;
@@ -256,6 +267,28 @@ impl RayMarcher<'_> {
     }
 }
 
+/// The light on smoke along a ray, which is looked up once for many steps.
+struct LitSmoke<'a> {
+    light: Option<&'a SmokeLight>,
+    /// The steps of which it is the light.
+    stride: f64,
+    radiance: [f32; 3],
+}
+
+impl LitSmoke<'_> {
+    /// The radiance of opaque smoke at a step. Strides are multiples of a stride from the camera, so that slices do not change them.
+    #[inline(always)]
+    fn radiance(&mut self, ray: &Ray, step: f64, number: f64) -> [f32; 3] {
+        let Some(light) = self.light else { return [0.0; 3] };
+        let stride = (number / LIGHT_STRIDE).floor();
+        if stride != self.stride {
+            self.stride = stride;
+            self.radiance = light.at(ray.at((stride + 0.5) * LIGHT_STRIDE * step));
+        }
+        self.radiance
+    }
+}
+
 /// Depth at which a ray leaves a block.
 #[inline(always)]
 fn exit_depth(ray: &Ray, block: [usize; 3], far: f64) -> f64 {
@@ -264,8 +297,8 @@ fn exit_depth(ray: &Ray, block: [usize; 3], far: f64) -> f64 {
         let direction = ray.direction[axis];
         if direction != 0.0 {
             let side = (block[axis] + usize::from(direction > 0.0)) * BLOCK;
-            // Points before the first block are in it, too.
-            let depth = (side as f64 - ray.origin[axis]) / direction;
+            // Cells before the first block are in it, too.
+            let depth = (side as f64 - 0.5 - ray.origin[axis]) / direction;
             exit = exit.min(depth);
         }
     }

@@ -10,7 +10,7 @@ use bansho_base::{
         once::get_or_compute,
     },
     image::Rect,
-    math::{DVec2, DVec3},
+    math::{self, DVec2, DVec3},
     phenomenon::{
         Deflection, Prepared,
         strip::{AovDescriptor, AovRule, DepthInterval, Strip, View},
@@ -18,11 +18,13 @@ use bansho_base::{
     },
 };
 
+use fearless_simd::dispatch;
+
 use super::{
-    field::GasField,
+    field::{GasField, SeenMixtures},
     haze::{HeatHaze, Refraction},
     march::{Gathered, Ray, RayMarcher},
-    sheet::SheetTable,
+    sheet::{LAST_SOOT, SheetTable},
     smoke::SmokeLight,
 };
 use crate::{
@@ -99,18 +101,21 @@ pub(crate) struct RenderedGas<'a> {
 }
 
 impl RenderedGas<'_> {
-    /// The mixture fractions from which on gas is seen, and from which on it may burn.
-    pub(crate) fn least_seen(&self) -> [f32; 2] {
+    /// The mixture fractions between which gas is seen.
+    pub(crate) fn seen(&self) -> SeenMixtures {
         let has_smoke = self.smoke_yield * self.rendering.soot_gain > 0.0;
-        let sheet = LEAST_SEEN * self.mixture.stoichiometric;
-        [if has_smoke { LEAST_SMOKE * self.mixture.stoichiometric } else { sheet }, sheet]
+        let [least_sheet, least_smoke, last] =
+            [LEAST_SEEN, LEAST_SMOKE, LAST_SOOT].map(|relative| relative * self.mixture.stoichiometric);
+        SeenMixtures { smoke: if has_smoke { least_smoke } else { least_sheet }, sheet: least_sheet, last }
     }
 }
 
 /// The gas of one frame, ready to be drawn into strips.
 pub(crate) struct PreparedVolume<'a> {
     gas: RenderedGas<'a>,
-    field: GasField,
+    field: GasField<'a>,
+    /// Length of a step of a ray, cells.
+    step: f64,
     view: &'a View,
     smoke_light: Option<SmokeLight>,
     sparks: Vec<SparkStreak>,
@@ -160,7 +165,8 @@ fn rect_of_box(box_corners: [DVec3; 2], view: &View) -> Rect {
 impl<'a> PreparedVolume<'a> {
     pub(crate) fn new(
         gas: RenderedGas<'a>,
-        field: GasField,
+        field: GasField<'a>,
+        step: f64,
         lights: &[Light],
         sparks: Vec<SparkStreak>,
         view: &'a View,
@@ -180,6 +186,7 @@ impl<'a> PreparedVolume<'a> {
             smoke_light,
             gas,
             field,
+            step,
             view,
             sparks,
             haze: OnceLock::new(),
@@ -190,12 +197,13 @@ impl<'a> PreparedVolume<'a> {
         let RenderedGas { rendering, .. } = self.gas;
         RayMarcher {
             field: &self.field,
+            step: self.step,
             sheet: self.gas.sheet,
             mixture: self.gas.mixture,
             black_body: color::black_body(),
             soot_absorption: (self.gas.soot * VISIBLE_SOOT_ABSORPTION * rendering.soot_gain) as f32,
             smoke_extinction: (self.gas.smoke_yield * SMOKE_EXTINCTION * rendering.soot_gain) as f32,
-            least_smoke: self.gas.least_seen()[0],
+            least_smoke: self.gas.seen().smoke,
             smoke_light: self.smoke_light.as_ref(),
             blue: rendering.blue as f32,
             offset_s: (self.view.shutter.middle() - self.gas.time) as f32,
@@ -223,6 +231,12 @@ impl<'a> PreparedVolume<'a> {
         if rect.is_empty() || near >= far {
             return;
         }
+        dispatch!(math::simd::level(), _simd => self.draw_rows(rect, [near, far], strip));
+    }
+
+    /// Draws the pixels of `rect` between two depths, m.
+    #[inline(always)]
+    fn draw_rows(&self, rect: Rect, [near, far]: [f64; 2], strip: &mut Strip) {
         let marcher = self.marcher();
         let blue = chemiluminescence_color();
         let mut row = RowBuffers::new(rect.width);

@@ -9,50 +9,60 @@ use super::super::fuel::soot_profile;
 /// Entries of the table.
 const ENTRIES: usize = 512;
 /// Last value of Z over Zs in the table; beyond it there is no soot.
-const LAST: f32 = 4.0;
+pub(crate) const LAST_SOOT: f32 = 4.0;
 /// Half of the width of the zone that shines blue, in Zs.
 const BLUE_WIDTH: f32 = 0.12;
 
 /// Integrals over the mixture fraction.
 #[derive(Debug)]
 pub(crate) struct SheetTable {
-    /// Integral of the profile of soot from 0, over Z in units of Zs.
-    soot: Vec<f32>,
+    /// Integrals from 0, over Z in units of Zs: of the profile of soot, and of soot times Z.
+    integrals: Vec<[f32; 2]>,
     per_stoichiometric: f32,
 }
 
 impl SheetTable {
     pub(crate) fn new(stoichiometric: f32) -> Self {
-        let step = LAST / (ENTRIES - 1) as f32;
-        let mut sum = 0.0;
-        let mut soot = Vec::with_capacity(ENTRIES);
+        let step = LAST_SOOT / (ENTRIES - 1) as f32;
+        let mut sums = [0.0_f64; 2];
+        let mut integrals = Vec::with_capacity(ENTRIES);
         for entry in 0..ENTRIES {
-            soot.push(sum as f32);
+            integrals.push(sums.map(|sum| sum as f32));
             // Simpson's rule over an interval.
             let start = entry as f32 * step;
-            let parts =
-                [soot_profile(start), soot_profile(start + 0.5 * step), soot_profile(start + step)].map(f64::from);
-            sum += f64::from(step) / 6.0 * (parts[0] + 4.0 * parts[1] + parts[2]);
+            for (offset, weight) in [(0.0, 1.0), (0.5, 4.0), (1.0, 1.0)] {
+                let place = start + offset * step;
+                let soot = f64::from(step) / 6.0 * weight * f64::from(soot_profile(place));
+                sums[0] += soot;
+                sums[1] += soot * f64::from(place);
+            }
         }
-        Self { soot, per_stoichiometric: 1.0 / stoichiometric }
+        Self { integrals, per_stoichiometric: 1.0 / stoichiometric }
     }
 
-    /// Mean of the profile of soot over an interval of Z with that middle and half width.
+    /// Mean of the profile of soot over an interval of Z with that middle and half width, and the Z at which the soot is in the mean.
     #[inline(always)]
-    pub(crate) fn mean_soot(&self, middle: f32, half_width: f32) -> f32 {
-        let (middle, half_width) = (middle * self.per_stoichiometric, half_width * self.per_stoichiometric);
+    pub(crate) fn mean_soot(&self, middle: f32, half_width: f32) -> [f32; 2] {
+        let (relative, half_width) = (middle * self.per_stoichiometric, half_width * self.per_stoichiometric);
         if half_width < 0.02 {
-            return soot_profile(middle);
+            return [soot_profile(relative), middle];
         }
-        (self.integral(middle + half_width) - self.integral(middle - half_width)) / (2.0 * half_width)
+        let (first, last) = (self.integral(relative - half_width), self.integral(relative + half_width));
+        let soot = last[0] - first[0];
+        // Less is rounding.
+        if soot <= 1e-5 {
+            return [0.0, middle];
+        }
+        [soot / (2.0 * half_width), (last[1] - first[1]) / (soot * self.per_stoichiometric)]
     }
 
     #[inline(always)]
-    fn integral(&self, relative: f32) -> f32 {
-        let place = relative.clamp(0.0, LAST) * ((ENTRIES - 1) as f32 / LAST);
+    fn integral(&self, relative: f32) -> [f32; 2] {
+        let place = relative.clamp(0.0, LAST_SOOT) * ((ENTRIES - 1) as f32 / LAST_SOOT);
         let below = (place as usize).min(ENTRIES - 2);
         let fraction = place - below as f32;
-        self.soot[below] + fraction * (self.soot[below + 1] - self.soot[below])
+        let (near, next) = (self.integrals[below], self.integrals[below + 1]);
+        [near[0] + fraction * (next[0] - near[0]), near[1] + fraction * (next[1] - near[1])]
     }
 
     /// Share of the blue zone that is crossed between two values of Z: 1 in all for a step from air into fuel.
@@ -72,9 +82,12 @@ mod tests {
     fn means_over_intervals_are_those_of_many_samples() {
         let table = SheetTable::new(0.06);
         for (middle, half_width) in [(0.09, 0.03), (0.06, 0.06), (0.2, 0.2), (0.1, 0.001), (0.5, 0.01)] {
-            let samples = (0..2000).map(|i| middle + half_width * ((i as f32 + 0.5) / 1000.0 - 1.0));
-            let mean = samples.map(|z| soot_profile(z / 0.06)).sum::<f32>() / 2000.0;
-            assert!((table.mean_soot(middle, half_width) - mean).abs() < 2e-3, "{middle} {half_width}");
+            let samples = || (0..2000).map(|i| middle + half_width * ((i as f32 + 0.5) / 1000.0 - 1.0));
+            let mean = samples().map(|z| soot_profile(z / 0.06)).sum::<f32>() / 2000.0;
+            let place = samples().map(|z| z * soot_profile(z / 0.06)).sum::<f32>() / (2000.0 * mean);
+            let [soot, at] = table.mean_soot(middle, half_width);
+            assert!((soot - mean).abs() < 2e-3, "{middle} {half_width}");
+            assert!(mean < 1e-3 || (at - place).abs() < 2e-3 * 0.06, "{middle} {half_width}: {at} {place}");
         }
         assert_eq!(table.blue_between(0.0, 1.0), 1.0);
         assert_eq!(table.blue_between(0.0, 0.03), 0.0);

@@ -47,8 +47,7 @@ impl SmokeLight {
         Some(Self { values, low: low.as_vec3(), scale })
     }
 
-    /// The radiance at a point of the fine grid.
-    #[inline(always)]
+    /// The radiance at a point in cells.
     pub(crate) fn at(&self, point: Vec3) -> [f32; 3] {
         let place = (point - self.low) * self.scale;
         let mut below = [0; 3];

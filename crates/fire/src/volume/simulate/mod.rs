@@ -40,7 +40,9 @@ const LEAST_MIXTURE: f32 = 2e-4;
 /// Cells around gas into which it may flow in a step.
 const MARGIN: usize = 3;
 /// Time in which the factor of emission follows the fire, s.
-const EMISSION_TIME_S: f32 = 0.3;
+const EMISSION_TIME_S: f32 = 0.1;
+/// Most heat that counts, over that of all burners at full flow: gas that has gathered may burn at once.
+const MOST_BURNING: f64 = 100.0;
 /// Bounds of that factor. A flame with hardly any soot radiates less than its fraction, since the radiation of its gases is not counted.
 const EMISSION_FACTORS: [f32; 2] = [0.02, 4.0];
 
@@ -63,6 +65,8 @@ pub(crate) struct SimulationConstants {
 pub(crate) struct VolumeFigures {
     /// Heat release rate of the burners, kW.
     pub heat_release_kw: f64,
+    /// Heat that burning gas releases, kW: the fuel that flows in, less what more of it is unburnt.
+    pub burning_kw: f64,
     /// Radiated power, kW.
     pub radiated_kw: f64,
     /// Height of the stoichiometric surface above the lowest burner, m.
@@ -83,6 +87,10 @@ pub(crate) struct Simulation {
     pub(crate) mixture: Mixture,
     /// Factor of the emission of soot, so that the fire radiates the fraction of its heat that its fuel radiates.
     pub(crate) emission_factor: f32,
+    /// Heat that burning gas has released of late, over that of all burners at full flow: the mean that the factor of emission follows.
+    pub(crate) recent_burning: f32,
+    /// Mass of fuel that has found no air, kg.
+    unburnt_kg: f64,
     pub(crate) figures: VolumeFigures,
     /// Of the grid and the solids as they are.
     burner_cells: BurnerCells,
@@ -102,6 +110,8 @@ impl Simulation {
             air: air.clone(),
             mixture,
             emission_factor: 1.0,
+            recent_burning: 0.0,
+            unburnt_kg: 0.0,
             figures: VolumeFigures::default(),
             burner_cells: BurnerCells::default(),
         }
@@ -124,6 +134,23 @@ impl Simulation {
         let mixture = &self.flow.contents.quantities[0];
         self.active = ActiveRows::around(&self.flow.grid, MARGIN, |index| mixture[index] > LEAST_MIXTURE);
         self.flow.restore_stage();
+        self.unburnt_kg = self.unburnt_kg();
+    }
+
+    /// Mass of fuel in the gas that has found no air, kg.
+    fn unburnt_kg(&self) -> f64 {
+        let grid = &self.flow.grid;
+        let density = &self.flow.contents.density;
+        let mixture = &self.flow.contents.quantities[0];
+        let stoichiometric = self.mixture.stoichiometric;
+        let layers = (0..grid.size[1]).into_par_iter().map(|y| {
+            let cells = grid.rows(y).flat_map(|(z, row)| self.active.row(y, z).map(move |x| row + x));
+            let fuel = cells.map(|index| f64::from(density[index] * (mixture[index] - stoichiometric).max(0.0)));
+            fuel.sum::<f64>()
+        });
+        let layers: Vec<f64> = layers.collect();
+        let volume = grid.spacing * grid.spacing * grid.spacing;
+        layers.iter().sum::<f64>() * volume / f64::from(1.0 - stoichiometric).max(1e-6)
     }
 
     /// Corners of the cells with gas, m; `None` if there are none.
@@ -171,6 +198,7 @@ impl Simulation {
         self.flow.transport(&self.active, seconds);
         self.add_fuel(&sources, seconds);
         self.react(seconds);
+        self.measure_burning(&sources, seconds);
         let wind = if self.shared.parameters.floor { [wind[0], 0.0, wind[2]] } else { wind };
         self.flow.accelerate(wind, seconds);
     }
@@ -282,12 +310,27 @@ impl Simulation {
             sums.iter().rposition(|layer| layer.burns).map_or(0, |padded_y| padded_y + 1 - bansho_fluid::GHOST_LAYERS);
         let lowest = self.shared.burners.iter().map(|burner| burner.extent()[0].y).fold(f64::INFINITY, f64::min);
         self.figures.height = (grid.origin.y + top as f64 * grid.spacing - lowest).max(0.0);
-        self.follow_radiant_fraction(radiated, seconds);
+    }
+
+    /// Finds how much heat the gas releases, which goes on after a burst of gas has ended.
+    fn measure_burning(&mut self, sources: &[(usize, f32)], seconds: f32) {
+        let flowed = sources.iter().map(|(_, mass)| f64::from(*mass)).sum::<f64>() * f64::from(seconds);
+        let unburnt = self.unburnt_kg();
+        let burnt = (self.unburnt_kg + flowed - unburnt).max(0.0);
+        self.unburnt_kg = unburnt;
+        let power = burnt * self.shared.fuel.heat_of_combustion / f64::from(seconds);
+        self.figures.burning_kw = power * 1e-3;
+        let rate = (seconds / EMISSION_TIME_S).min(1.0);
+        let share = (power * 1e-3 / self.shared.size.heat_release_kw.max(1e-9)).min(MOST_BURNING);
+        self.recent_burning += rate * (share as f32 - self.recent_burning);
+        self.follow_radiant_fraction(seconds);
     }
 
     /// Changes the factor of emission toward the one with which the fire radiates its fraction.
-    fn follow_radiant_fraction(&mut self, radiated: f64, seconds: f32) {
-        let wanted = self.shared.fuel.radiant_fraction * self.figures.heat_release_kw * 1e3;
+    fn follow_radiant_fraction(&mut self, seconds: f32) {
+        let radiated = self.figures.radiated_kw * 1e3;
+        let wanted =
+            self.shared.fuel.radiant_fraction * f64::from(self.recent_burning) * self.shared.size.heat_release_kw * 1e3;
         if radiated > 0.0 && wanted > 0.0 {
             let ideal = self.emission_factor * (wanted / radiated) as f32;
             let rate = (seconds / EMISSION_TIME_S).min(1.0);

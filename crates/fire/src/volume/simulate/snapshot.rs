@@ -4,9 +4,9 @@ use bansho_base::{phenomenon::SnapshotError, world::air::Air};
 
 use super::Simulation;
 
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Numbers before the fields.
-const HEAD: usize = 4;
+const HEAD: usize = 5;
 /// Larger than any value of a simulated field, and small enough that computations do not overflow.
 const MAX_MAGNITUDE: f32 = 1e7;
 
@@ -18,7 +18,8 @@ pub(crate) fn write(time: f64, simulation: Option<&Simulation>) -> Vec<u8> {
     let Some(simulation) = simulation else { return bytes };
     bytes.extend([simulation.air.temperature_k, simulation.air.pressure_pa].into_iter().flat_map(f64::to_le_bytes));
     let wind = simulation.flow.ambient().velocity;
-    bytes.extend(std::iter::once(simulation.emission_factor).chain(wind).flat_map(f32::to_le_bytes));
+    let head = [simulation.emission_factor, simulation.recent_burning];
+    bytes.extend(head.into_iter().chain(wind).flat_map(f32::to_le_bytes));
     for field in simulation.flow.state() {
         bytes.extend(field.iter().flat_map(|value| value.to_le_bytes()));
     }
@@ -62,13 +63,13 @@ pub(crate) fn read(
         .map(start)
         .find(|simulation| HEAD + simulation.flow.state().map(Vec::len).sum::<usize>() == count)
         .ok_or(SnapshotError::Damaged)?;
-    let factor = next()?;
-    if !(0.0..=1000.0).contains(&factor) {
+    let (factor, burning) = (next()?, next()?);
+    if !((0.0..=1000.0).contains(&factor) && burning >= 0.0) {
         return Err(SnapshotError::Damaged);
     }
     let velocity = [next()?, next()?, next()?];
     simulation.set_air(air, velocity);
-    simulation.emission_factor = factor;
+    (simulation.emission_factor, simulation.recent_burning) = (factor, burning);
     for field in simulation.flow.state_mut() {
         for value in field {
             *value = next()?;
