@@ -20,7 +20,7 @@
 //! 1. [`Flow::transport`] carries density and quantities, in two stages ([`Carrier::advance`]), with the values at faces of `reconstruction`.
 //! 2. The owner burns the gas and states [`Flow::divergence`].
 //! 3. [`Flow::accelerate`] carries momentum (`momentum`), adds forces, and projects the velocity (`projection`: sine transforms along x and z, elimination
-//!    along y; with solids as preconditioner of conjugate gradients).
+//!    along y; with solids the capacitance matrix method).
 //!
 //! The pressure's equation has one density; the rest of its acceleration, `(1/rho - 1/rho_0) grad p`, is that of the pressure of the last step. Mass is conserved
 //! exactly, and the density that a mixture should have by its temperature is reached by the expansion: mixing of ideal gases changes no volume by itself, so
@@ -34,6 +34,7 @@
 //! - K. McGrattan et al., "Fire Dynamics Simulator, technical reference guide", NIST SP 1018: open sides.
 //! - J. Smagorinsky, "General circulation experiments with the primitive equations" (1963): eddy viscosity.
 //! - J. Makhoul, "A fast cosine transform in one and two dimensions" (1980): the transforms.
+//! - B. Buzbee, F. Dorr, J. George and G. Golub, "The direct solution of the discrete Poisson equation on irregular regions" (1971): pressure around solids.
 //! - M. Hestenes and E. Stiefel, "Methods of conjugate gradients for solving linear systems" (1952).
 
 mod flow;
