@@ -1,8 +1,9 @@
 //! The pressure around solids by the capacitance matrix method (Buzbee, Dorr, George and Golub 1971; Proskurowski and Widlund 1976).
 //!
 //! The equation around solids differs from that of the empty box only in cells beside a solid. Sources in those cells are sought with which the solution of the
-//! empty box has no gradient across the faces of solids. All that iterates is as small as the surface of the solids, and the box is solved in their layers
-//! alone.
+//! empty box has no gradient across the faces of solids. With the equation of the empty box `L p = b` (p in Pa, b in Pa/m^2) and the terms that it has across
+//! these faces, `(B p)_i = (1 / h^2) sum(p_solid - p_i)`, gas obeys `(L - B) p = b`: sources `q = B p` in `L p = b + q`. All that iterates is as small as the
+//! surface of the solids, and the box is solved in their layers alone.
 
 use std::ops::Range;
 

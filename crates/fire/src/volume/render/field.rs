@@ -158,7 +158,7 @@ impl<'a> GasField<'a> {
         self.spline(&self.mixture, point)
     }
 
-    /// Deficit of heat at a point in cells, K: smooth as well, for the light of soot follows it by a power of ten or more.
+    /// Deficit of heat at a point in cells, K. It must be smooth as well: the light of soot grows with more than the tenth power of its temperature.
     #[inline(always)]
     pub(crate) fn deficit(&self, point: Vec3) -> f32 {
         self.spline(&self.deficit, point)

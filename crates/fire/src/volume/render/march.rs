@@ -193,6 +193,9 @@ impl RayMarcher<'_> {
             let way = if change == 0.0 { 1.0 } else { ((soot_mixture - previous) / change).clamp(0.0, 1.0) };
             let deficit = self.field.deficit(point - step_in_cells * (1.0 - way));
             let smoke = self.smoke(center, deficit);
+            if soot <= 0.0 && blue <= 0.0 && smoke <= 0.0 {
+                continue;
+            }
             let absorption = self.soot_absorption * soot;
             let tau = (absorption + smoke) * meters;
             let opacity = 1.0 - approximations::exp(-tau);
