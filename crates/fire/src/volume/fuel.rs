@@ -127,16 +127,18 @@ impl Mixture {
     }
 }
 
+/// Z over Zs from which on there is soot, where there is most, and beyond which there is none.
+pub(crate) const FIRST_SOOT: f32 = 1.0;
+pub(crate) const MOST_SOOT: f32 = 1.6;
+pub(crate) const LAST_SOOT: f32 = 3.2;
+
 /// Volume fraction of soot relative to its largest, as a function of Z over the stoichiometric Zs: it forms on the rich side of the sheet, most at 1.6, and burns
 /// up before Zs.
 #[must_use]
 #[inline(always)]
 pub fn soot_profile(relative_mixture: f32) -> f32 {
-    const FIRST: f32 = 1.0;
-    const MOST: f32 = 1.6;
-    const LAST: f32 = 3.2;
-    let rise = ((relative_mixture - FIRST) * (1.0 / (MOST - FIRST))).clamp(0.0, 1.0);
-    let fall = ((LAST - relative_mixture) * (1.0 / (LAST - MOST))).clamp(0.0, 1.0);
+    let rise = ((relative_mixture - FIRST_SOOT) * (1.0 / (MOST_SOOT - FIRST_SOOT))).clamp(0.0, 1.0);
+    let fall = ((LAST_SOOT - relative_mixture) * (1.0 / (LAST_SOOT - MOST_SOOT))).clamp(0.0, 1.0);
     let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
     smooth(rise) * smooth(fall)
 }

@@ -14,6 +14,7 @@
 //! - K. McGrattan et al., "Fire Dynamics Simulator, technical reference guide", NIST SP 1018: mixture fraction, radiant fraction, open sides.
 //! - M. Modest, "Radiative heat transfer" (2013): Planck mean of soot.
 //! - K. Engel, M. Kraus and T. Ertl, "High-quality pre-integrated volume rendering using hardware-accelerated pixel shading" (2001): `render::sheet`.
+//! - R. Keys, "Cubic convolution interpolation for digital image processing" (1981): `render::nodes`.
 //! - G. Mulholland and C. Croarkin, "Specific extinction coefficient of flame generated smoke" (2000).
 //!
 //! # Equations
@@ -26,15 +27,16 @@
 //! | `DH/Dt = f 4 sigma k_P (T^4 - T_air^4) / (rho c_p)` | radiation; f so that the fire radiates its fuel's fraction | `simulate::Simulation::follow_radiant_fraction` |
 //! | `m = Q / H_c` | mass flux of a burner | `simulate::Simulation::sources` |
 //! | `D* = (Q / (rho c_p T sqrt(g)))^(2/5)` | characteristic diameter | `simulate::domain::FireSize::new` |
-//! | `k = 4.9 f_v / lambda` | absorption of soot | `render::march::RayMarcher::march` |
+//! | `k = 4.9 f_v / lambda` | absorption of soot | `render::optics::GasOptics::crossing` |
 //!
 //! # Data flow
 //! 1. `parameters` holds the scene's values, `fuel` the properties of fuels, `error` errors of their combinations; `model` builds a flame.
 //! 2. `simulate::domain` determines the grid, `simulate::burners` the cells into which gas flows; `simulate` steps the gas; `simulate::snapshot` serializes it.
 //!    The beginning is computed on a grid of twice the spacing.
 //! 3. `run` steps and draws one shot; `phenomenon` is what all shots share, as the rest of Bansho sees it.
-//! 4. To draw a frame, `render::field` interpolates Z to a finer grid and finds the blocks in which there is anything to see, and `render::march` steps
-//!    along rays, with the light of the sheet between two steps from `render::sheet` and the light on smoke from `render::smoke`.
+//! 4. To draw a frame, `render::field` holds the gas of a state, and `render::blocks` where there is anything to see. `render::nodes` looks it up along rays at most
+//!    0.65 cells apart, `render::march` steps along all rays between these, sixteen at a time, with what gas emits and absorbs from `render::optics` and
+//!    `render::sheet` and the light on smoke from `render::smoke`. `render::reference` is the naive way, one ray at a time, for tests and benchmarks.
 //! 5. `render::lights` gives point lights for other objects, `render::haze` the deflection of light from behind; `render::prepared` draws strips and AOVs.
 
 mod error;

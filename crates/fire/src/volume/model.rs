@@ -10,19 +10,16 @@ use bansho_base::{
 
 use super::{
     error::{VolumeError, VolumeErrorKind},
-    fuel::{FuelProperties, Mixture},
+    fuel::FuelProperties,
     parameters::FlameVolumeParameters,
-    render::sheet::SheetTable,
     simulate::{SimulationConstants, burners::VolumeBurner, domain},
 };
-use bansho_base::world::air::Air;
 
 /// A volume flame of a scene. It does not change; a run of it is a [`FlameVolumeRun`](super::FlameVolumeRun).
 #[derive(Debug)]
 pub struct FlameVolume {
     pub(super) name: String,
     pub(super) constants: Arc<SimulationConstants>,
-    pub(super) sheet: SheetTable,
     /// Duration of the simulation before time 0, s.
     pub(super) preroll: f64,
     pub(super) crossfade: f64,
@@ -51,7 +48,6 @@ impl FlameVolume {
         let size = domain::FireSize::new(&burners);
         let coarse_grid = domain::coarse_grid(&parameters, &burners, &size)?;
         let fuel = fuel_of(&parameters);
-        let sheet = SheetTable::new(Mixture::new(&fuel, &Air::default()).stoichiometric);
         // Gas crosses the domain a few times in these times, at the speed of free fall over its height.
         let height = coarse_grid.size[1] as f64 * coarse_grid.spacing;
         let crossing = 2.0 * bansho_base::math::sqrt(height / bansho_base::world::gravity::STANDARD_GRAVITY);
@@ -63,7 +59,7 @@ impl FlameVolume {
         // The time of the last eddies is computed on the flame's own grid.
         let refined_from = -(0.7 * crossing + 0.5 * crossfade);
         let constants = SimulationConstants { parameters, fuel, burners, size, coarse_grid, refined_from, key };
-        Ok(Self { name: name.to_owned(), constants: Arc::new(constants), sheet, preroll, crossfade })
+        Ok(Self { name: name.to_owned(), constants: Arc::new(constants), preroll, crossfade })
     }
 
     /// Its parameters.

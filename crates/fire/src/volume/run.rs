@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    host::observer::{Cancelled, Observer},
+    host::observer::{Cancelled, Observer, Unobserved, check},
     math::{DVec2, DVec3},
     phenomenon::{
         Prepared, Run, SnapshotError, Stepped,
@@ -19,6 +19,7 @@ use super::{
         field::GasField,
         lights::point_lights,
         prepared::{PreparedVolume, RenderedGas, depths_of_box},
+        smoke::SmokeLight,
     },
     simulate::{Simulation, snapshot},
 };
@@ -45,7 +46,6 @@ impl FlameVolumeRun {
     fn rendered_gas(&self, simulation: &Simulation) -> RenderedGas<'_> {
         let fuel = &self.flame.constants.fuel;
         RenderedGas {
-            sheet: &self.flame.sheet,
             mixture: simulation.mixture,
             rendering: &self.flame.parameters().rendering,
             soot: fuel.soot_ppm * 1e-6,
@@ -83,6 +83,15 @@ impl FlameVolumeRun {
         grid.spacing * view.camera.focal_pixels / distance
     }
 
+    /// Luminance of the picture, row by row, by rays one at a time: the naive way, for benchmarks.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn single_ray_luminance(&self, view: &View, surroundings: &Surroundings) -> Vec<f32> {
+        let Some(simulation) = &self.simulation else { return Vec::new() };
+        let prepared = self.prepared(simulation, view, surroundings, &Unobserved);
+        prepared.map_or_else(|Cancelled| Vec::new(), |prepared| prepared.single_ray_luminance())
+    }
+
     fn prepared<'a>(
         &'a self,
         simulation: &'a Simulation,
@@ -93,11 +102,25 @@ impl FlameVolumeRun {
         let gas = self.rendered_gas(simulation);
         let step = if self.cell_pixels(simulation, view) > 1.0 { 0.5 } else { 1.0 };
         let position = DVec3::from(self.flame.parameters().position);
-        let field = GasField::new(&simulation.flow, &simulation.active, position, gas.seen());
+        let field = GasField::new(
+            &simulation.flow,
+            &simulation.active,
+            position,
+            gas.time_samples(view, &simulation.flow.grid).longest(),
+            gas.seen(),
+        );
         let mut sparks = self.sparks(view).streaks(view, surroundings.wind);
         sparks.sort_by(|a, b| a.sorting_depth.total_cmp(&b.sorting_depth));
         let lights = self.publish(view.shutter).lights;
-        PreparedVolume::new(gas, field, step, &lights, sparks, view, surroundings, observer)
+        check(observer)?;
+        let optics = gas.optics();
+        let smoke_light = if optics.smoke_extinction > 0.0 {
+            let (flow, active, albedo) = (&simulation.flow, &simulation.active, gas.rendering.smoke_albedo);
+            SmokeLight::new(&field, flow, active, &optics, &lights, surroundings, albedo)
+        } else {
+            None
+        };
+        Ok(PreparedVolume::new(gas, field, smoke_light, step, sparks, view))
     }
 }
 

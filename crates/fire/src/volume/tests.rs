@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use bansho_base::{
-    color,
     host::assets::MemoryAssets,
     math::{self, DVec3, curve::Interpolation, random::Key},
     parameters::{Auto, animated::Animated},
@@ -23,16 +22,11 @@ use super::{
     fuel::Fuel,
     model::fuel_of,
     parameters::{FlameVolumeParameters, VolumeBurnerParameters},
-    render::{
-        field::{GasField, SeenMixtures},
-        march::{Ray, RayMarcher},
-        sheet::{LAST_SOOT, SheetTable},
-    },
     simulate::{Simulation, SimulationConstants, burners::VolumeBurner, domain},
 };
 
 /// A fire on a disk, with so many cells across it.
-fn fire(fuel: Fuel, diameter: f64, heat_release_kw: f64, cells: f64) -> FlameVolumeParameters {
+pub(super) fn fire(fuel: Fuel, diameter: f64, heat_release_kw: f64, cells: f64) -> FlameVolumeParameters {
     let burner = VolumeBurnerParameters { diameter, heat_release_kw, ..Default::default() };
     FlameVolumeParameters {
         burners: vec![burner],
@@ -44,7 +38,7 @@ fn fire(fuel: Fuel, diameter: f64, heat_release_kw: f64, cells: f64) -> FlameVol
 }
 
 /// The gas of a fire on its final grid from the beginning.
-fn simulation(parameters: FlameVolumeParameters, seed: u64) -> Simulation {
+pub(super) fn simulation(parameters: FlameVolumeParameters, seed: u64) -> Simulation {
     let key = Key::new(seed, "fire");
     let burners = VolumeBurner::list(&parameters, key, &MemoryAssets::default()).unwrap();
     let size = domain::FireSize::new(&burners);
@@ -55,7 +49,7 @@ fn simulation(parameters: FlameVolumeParameters, seed: u64) -> Simulation {
     Simulation::new(Arc::new(constants), false, &Air::default(), [0.0; 3])
 }
 
-fn still_air() -> Wind {
+pub(super) fn still_air() -> Wind {
     Wind::new(WindParameters::default(), 1, None)
 }
 
@@ -139,47 +133,6 @@ fn a_burst_radiates_the_fraction_of_its_fuel() {
     assert!(burnt_late > 0.15 * burnt, "{burnt_late} kJ of {burnt} after the burst");
     let share = radiated / burnt / simulation.shared.fuel.radiant_fraction;
     assert!((0.7..1.3).contains(&share), "{share} of the radiant fraction");
-}
-
-/// Steps of half a cell, which are taken near, give 13 % less light than those of an eighth, steps of a cell 30 %: the light of soot at the mean of its
-/// temperatures is less than the mean of its light.
-#[test]
-fn longer_steps_of_rays_lose_a_bounded_part_of_the_light() {
-    let wind = still_air();
-    let mut simulation = simulation(fire(Fuel::Propane, 0.37, 34.4, 10.0), 1);
-    for number in 0..30 {
-        simulation.step(f64::from(number) / 60.0, &Surroundings::from_wind(&wind));
-    }
-    let sheet = SheetTable::new(simulation.mixture.stoichiometric);
-    let zs = simulation.mixture.stoichiometric;
-    let seen = SeenMixtures { smoke: 0.8 * zs, sheet: 0.8 * zs, last: LAST_SOOT * zs };
-    let field = GasField::new(&simulation.flow, &simulation.active, DVec3::ZERO, seen);
-    let light = |step: f64| {
-        let marcher = RayMarcher {
-            field: &field,
-            step,
-            sheet: &sheet,
-            mixture: simulation.mixture,
-            black_body: color::black_body(),
-            soot_absorption: 20.0,
-            smoke_extinction: 0.0,
-            least_smoke: seen.smoke,
-            smoke_light: None,
-            blue: 0.0,
-            offset_s: 0.0,
-            exposure_s: 0.0,
-            time_samples: 1,
-        };
-        let rays = (0..2400).map(|index| {
-            let [x, y] = [f64::from(index % 40) / 40.0 - 0.5, f64::from(index / 40) / 60.0];
-            let ray = Ray::new(&field, DVec3::new(x, y, 3.0), DVec3::new(0.013, 0.007, -1.0));
-            marcher.gather(&ray, [0.0, 10.0]).map_or(0.0, |gathered| f64::from(gathered.luminance))
-        });
-        rays.sum::<f64>()
-    };
-    let [exact, half, whole] = [0.125, 0.5, 1.0].map(light);
-    assert!(exact > 1e4, "{exact}");
-    assert!((half / exact - 1.0).abs() < 0.15 && (whole / exact - 1.0).abs() < 0.32, "{half} {whole} {exact}");
 }
 
 #[test]

@@ -1,129 +1,47 @@
-//! The gas as rays see it: the mixture fraction by cubic B-splines, what else belongs to it, and the blocks in which there is anything to see.
-
-use std::borrow::Cow;
+//! The gas as rays see it: mixture fraction and deficit of heat by cubic B-splines, and its velocity.
 
 use bansho_base::{
     host::parallel::prelude::*,
-    math::{DVec3, Vec3},
+    math::{
+        DVec3, Vec3,
+        simd::{FourLanes, HalfLanes, Real},
+    },
 };
 use bansho_fluid::{ActiveRows, Flow, GHOST_LAYERS, Grid};
+use fearless_simd::{Simd, prelude::*};
 
-/// Side of a block, cells.
-pub(crate) const BLOCK: usize = 4;
+use super::blocks::{Blocks, SeenMixtures};
 
 /// Largest speed of gas that is drawn, m/s.
 const FASTEST: f32 = 1e3;
+/// Width of the band along open sides in which gas fades out in the picture, cells.
+const FADING_CELLS: f32 = 6.0;
 
+/// Mixture fraction, and deficit of heat (K).
+type Gas = [f32; 2];
 /// Velocity, m/s, and 0.
 type PaddedVelocity = [f32; 4];
 
-/// What is seen in a block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum BlockContents {
-    Nothing,
-    /// Smoke alone, which is smooth.
-    Smoke,
-    /// A sheet that burns.
-    Sheet,
-}
-
-/// Mixture fractions between which gas is seen.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SeenMixtures {
-    /// From here on as smoke.
-    pub(crate) smoke: f32,
-    /// From here on it may be in a sheet.
-    pub(crate) sheet: f32,
-    /// Beyond it nothing is seen.
-    pub(crate) last: f32,
-}
-
 /// The gas of one state.
-pub(crate) struct GasField<'a> {
+pub(crate) struct GasField {
     /// The grid of the flow, in the world.
     pub(crate) grid: Grid,
-    /// Mixture fraction, and deficit of heat (K), with ghost cells.
-    mixture: Cow<'a, [f32]>,
-    deficit: Cow<'a, [f32]>,
+    /// Mixture fraction and deficit beside each other, with ghost cells: both are looked up at the same points.
+    gas: Vec<Gas>,
     /// Velocity in cells.
     velocity: Vec<PaddedVelocity>,
-    /// What is seen in each block or beside it.
-    contents: Vec<BlockContents>,
-    blocks: [usize; 3],
-    /// Corners of the blocks that are seen, cells; `None` if none is.
-    pub(crate) seen_bounds: Option<[[usize; 3]; 2]>,
+    pub(crate) blocks: Blocks,
 }
 
-impl<'a> GasField<'a> {
-    /// The gas of a flow at `position` (m).
-    pub(crate) fn new(flow: &'a Flow, active: &ActiveRows, position: DVec3, seen: SeenMixtures) -> Self {
+impl GasField {
+    /// The gas of a flow at `position` (m). It is seen for at most `seconds` from its state on.
+    pub(crate) fn new(flow: &Flow, active: &ActiveRows, position: DVec3, seconds: f32, seen: SeenMixtures) -> Self {
         let grid = Grid { origin: flow.grid.origin + position, ..flow.grid };
-        let [mixture, deficit] = match continued_into_solids(flow) {
-            Some(continued) => continued.map(Cow::Owned),
-            None => flow.contents.quantities.each_ref().map(|quantity| Cow::Borrowed(quantity.as_slice())),
-        };
+        let mut gas = interleaved(flow, active);
+        continue_into_solids(flow, &mut gas);
         let velocity = velocities(flow, active);
-        let blocks = grid.size.map(|cells| cells.div_ceil(BLOCK));
-        let mut field = Self { grid, mixture, deficit, velocity, contents: Vec::new(), blocks, seen_bounds: None };
-        field.find_seen_blocks(seen);
-        field
-    }
-
-    /// The least and the largest mixture fraction in each block.
-    fn block_ranges(&self) -> Vec<[f32; 2]> {
-        let [_, height, depth] = self.grid.size;
-        let [columns, layers, rows] = self.blocks;
-        let of_row = |row: usize| {
-            let (layer, row) = (row / rows, row % rows);
-            let mut ranges = vec![[f32::INFINITY, 0.0_f32]; columns];
-            for y in layer * BLOCK..((layer + 1) * BLOCK).min(height) {
-                for z in row * BLOCK..((row + 1) * BLOCK).min(depth) {
-                    let first = self.grid.index([0, y, z]);
-                    let values = &self.mixture[first..first + self.grid.size[0]];
-                    for ([least, most], values) in ranges.iter_mut().zip(values.chunks(BLOCK)) {
-                        *least = values.iter().fold(*least, |least, value| least.min(*value));
-                        *most = values.iter().fold(*most, |most, value| most.max(*value));
-                    }
-                }
-            }
-            ranges
-        };
-        (0..layers * rows).into_par_iter().flat_map_iter(of_row).collect()
-    }
-
-    fn find_seen_blocks(&mut self, seen: SeenMixtures) {
-        let [columns, layers, rows] = self.blocks;
-        let ranges = self.block_ranges();
-        // A ray that crosses a block reads cells of its neighbors too.
-        let mut contents = vec![BlockContents::Nothing; ranges.len()];
-        let mut bounds: Option<[[usize; 3]; 2]> = None;
-        for layer in 0..layers {
-            for row in 0..rows {
-                for column in 0..columns {
-                    let near = |center: usize, count: usize| center.saturating_sub(1)..(center + 2).min(count);
-                    let blocks = near(layer, layers).flat_map(|y| near(row, rows).map(move |z| (y, z)));
-                    let around =
-                        blocks.flat_map(|(y, z)| near(column, columns).map(move |x| (y * rows + z) * columns + x));
-                    let range = around.fold([f32::INFINITY, 0.0_f32], |[least, most], block| {
-                        [least.min(ranges[block][0]), most.max(ranges[block][1])]
-                    });
-                    let found = seen.contents(range);
-                    if found > BlockContents::Nothing {
-                        contents[(layer * rows + row) * columns + column] = found;
-                        let first = [column, layer, row].map(|block| block * BLOCK);
-                        let last = first.map(|cell| cell + BLOCK);
-                        bounds = Some(bounds.map_or([first, last], |[low, high]| {
-                            [
-                                std::array::from_fn(|axis| low[axis].min(first[axis])),
-                                std::array::from_fn(|axis| high[axis].max(last[axis])),
-                            ]
-                        }));
-                    }
-                }
-            }
-        }
-        self.contents = contents;
-        self.seen_bounds = bounds;
+        let blocks = Blocks::new(&grid, active, &gas, &velocity, seconds, seen);
+        Self { grid, gas, velocity, blocks }
     }
 
     /// A point of the world in cells, from the center of the first one.
@@ -138,60 +56,41 @@ impl<'a> GasField<'a> {
 
     /// Corners of what is seen in the world, m.
     pub(crate) fn seen_corners(&self) -> Option<[DVec3; 2]> {
-        self.seen_bounds
-            .map(|corners| corners.map(|corner| self.point_in_world(DVec3::from(corner.map(|c| c as f64 - 0.5)))))
+        self.blocks.seen_corners().map(|corners| corners.map(|corner| self.point_in_world(corner)))
     }
 
-    /// What is seen in the block of a point, and the block.
+    /// Mixture fraction and deficit of heat (K) at a point in cells: the cubic B-spline, whose slope and curvature are smooth. The brightness of a sheet is the inverse
+    /// of the slope of the mixture fraction across it, so that lookups with jumps of slope or curvature show the cells as fine lines; and the light of soot grows
+    /// with more than the tenth power of its temperature.
     #[inline(always)]
-    pub(crate) fn block(&self, point: Vec3) -> (BlockContents, [usize; 3]) {
-        let place = |value: f32, axis: usize| (((value + 0.5).max(0.0) as usize) / BLOCK).min(self.blocks[axis] - 1);
-        let block = [place(point.x, 0), place(point.y, 1), place(point.z, 2)];
-        let index = (block[1] * self.blocks[2] + block[2]) * self.blocks[0] + block[0];
-        (self.contents[index], block)
-    }
-
-    /// Mixture fraction at a point in cells: the cubic B-spline, whose slope and curvature are smooth. The brightness of a sheet is the inverse of the slope of
-    /// the mixture fraction across it, so that lookups with jumps of slope or curvature show the cells as fine lines.
-    #[inline(always)]
-    pub(crate) fn mixture(&self, point: Vec3) -> f32 {
-        self.spline(&self.mixture, point)
-    }
-
-    /// Deficit of heat at a point in cells, K. It must be smooth as well: the light of soot grows with more than the tenth power of its temperature.
-    #[inline(always)]
-    pub(crate) fn deficit(&self, point: Vec3) -> f32 {
-        self.spline(&self.deficit, point)
-    }
-
-    #[inline(always)]
-    fn spline(&self, values: &[f32], point: Vec3) -> f32 {
+    pub(crate) fn gas<S: Simd>(&self, simd: S, point: Vec3) -> Gas {
         let [width, height, depth] = self.grid.size;
         let (x, weights_x) = spline_taps(point.x, width);
         let (y, weights_y) = spline_taps(point.y, height);
         let (z, weights_z) = spline_taps(point.z, depth);
         let [_, plane, row] = self.grid.strides();
         let corner = y * plane + z * row + x;
-        let values = &values[corner..corner + 3 * plane + 3 * row + 4];
-        let mut sums = [0.0; 4];
+        let values = &self.gas[corner..corner + 3 * plane + 3 * row + 4].as_flattened();
+        let mut sum = HalfLanes::splat(simd, 0.0);
         for (j, weight_y) in weights_y.into_iter().enumerate() {
-            let mut layer = [0.0; 4];
+            let mut layer = HalfLanes::splat(simd, 0.0);
             for (k, weight_z) in weights_z.into_iter().enumerate() {
-                let near = &values[j * plane + k * row..][..4];
-                for i in 0..4 {
-                    layer[i] += weight_z * near[i];
-                }
+                let first = 2 * (j * plane + k * row);
+                let near = HalfLanes::from_slice(simd, &values[first..first + 8]);
+                layer = near.fma(near.broadcast(weight_z), layer);
             }
-            for i in 0..4 {
-                sums[i] += weight_y * layer[i];
-            }
+            sum = layer.fma(layer.broadcast(weight_y), sum);
         }
-        sums[0] * weights_x[0] + sums[1] * weights_x[1] + (sums[2] * weights_x[2] + sums[3] * weights_x[3])
+        let [a, b, c, d] = weights_x;
+        let products = sum * HalfLanes::from_slice(simd, &[a, a, b, b, c, c, d, d]);
+        let (low, high) = products.split();
+        let pairs = low + high;
+        [pairs[0] + pairs[2], pairs[1] + pairs[3]]
     }
 
     /// Velocity at a point in cells, m/s.
     #[inline(always)]
-    pub(crate) fn velocity(&self, point: Vec3) -> Vec3 {
+    pub(crate) fn velocity<S: Simd>(&self, simd: S, point: Vec3) -> Vec3 {
         let [width, height, depth] = self.grid.size;
         let (x, fx) = place(point.x, width);
         let (y, fy) = place(point.y, height);
@@ -199,67 +98,92 @@ impl<'a> GasField<'a> {
         let (row, plane) = (width, width * depth);
         let at = y * plane + z * row + x;
         let values = &self.velocity[at..at + plane + row + 2];
-        let mut result = [0.0; 4];
+        let mut sum = FourLanes::splat(simd, 0.0);
         for (j, weight_y) in [1.0 - fy, fy].into_iter().enumerate() {
             for (k, weight_z) in [1.0 - fz, fz].into_iter().enumerate() {
-                let [near, next] = [values[j * plane + k * row], values[j * plane + k * row + 1]];
-                let weight = weight_y * weight_z;
-                for c in 0..4 {
-                    result[c] += weight * (near[c] + fx * (next[c] - near[c]));
-                }
+                let first = j * plane + k * row;
+                let near = FourLanes::from_slice(simd, &values[first]);
+                let next = FourLanes::from_slice(simd, &values[first + 1]);
+                let between = (next - near).fma(near.broadcast(fx), near);
+                sum = between.fma(near.broadcast(weight_y * weight_z), sum);
             }
         }
-        Vec3::new(result[0], result[1], result[2])
+        Vec3::new(sum[0], sum[1], sum[2])
     }
-}
 
-impl SeenMixtures {
-    /// What is seen where the mixture fraction is in a range.
-    fn contents(&self, [least, most]: [f32; 2]) -> BlockContents {
-        if least > self.last || most < self.smoke.min(self.sheet) {
-            BlockContents::Nothing
-        } else if most >= self.sheet {
-            BlockContents::Sheet
-        } else {
-            BlockContents::Smoke
-        }
+    /// Factor of the extinction of gas at a point in cells: it fades out along the open sides and the top of the domain, where the gas that is simulated ends and
+    /// smoke would be cut along a plane.
+    #[inline(always)]
+    pub(crate) fn fading(&self, point: Vec3) -> f32 {
+        let [width, height, depth] = self.grid.size.map(|cells| cells as f32 - 0.5);
+        let side = |place: f32, far: f32| (place + 0.5).min(far - place);
+        let distance = side(point.x, width).min(side(point.z, depth)).min(height - point.y);
+        (distance * (1.0 / FADING_CELLS)).simd_smoothstep()
     }
 }
 
 /// Place in memory of the first of the four cells around a place in cells along an axis, and the weights of their cubic B-splines.
 #[inline(always)]
-fn spline_taps(value: f32, count: usize) -> (usize, [f32; 4]) {
-    let from_ghost = value.clamp(-0.5, count as f32 - 0.5) + 1.0;
+pub(crate) fn spline_taps(value: f32, count: usize) -> (usize, [f32; 4]) {
+    let from_ghost = value.simd_max(-0.5).simd_min(count as f32 - 0.5) + 1.0;
     let below = from_ghost as usize;
-    let t = from_ghost - below as f32;
+    (below + GHOST_LAYERS - 2, spline_weights(from_ghost - below as f32))
+}
+
+/// Weights of the cubic B-splines of four points at a fraction of the way from the second to the third.
+#[inline(always)]
+pub(crate) fn spline_weights(t: f32) -> [f32; 4] {
     let (square, rest) = (t * t, 1.0 - t);
-    let weights = [
+    [
         rest * rest * rest * (1.0 / 6.0),
         (2.0 / 3.0) - square * (1.0 - 0.5 * t),
         (1.0 / 6.0) + 0.5 * (t + square - square * t),
         square * t * (1.0 / 6.0),
-    ];
-    (below + GHOST_LAYERS - 2, weights)
+    ]
 }
 
 /// The point below a place, with one above it, and the fraction of the way between.
 #[inline(always)]
 fn place(value: f32, count: usize) -> (usize, f32) {
-    let clamped = value.clamp(0.0, (count - 1) as f32);
+    let clamped = value.simd_max(0.0).simd_min((count - 1) as f32);
     let below = (clamped as usize).min(count - 2);
     (below, clamped - below as f32)
 }
 
-/// Mixture fraction and deficit, continued into solids from the gas beside them: the splines around a point at the surface of a solid read cells inside of it, and
-/// a sheet would follow their steps if these held air. `None` without solids.
-fn continued_into_solids(flow: &Flow) -> Option<[Vec<f32>; 2]> {
+/// Mixture fraction and deficit of the rows with gas, with ghost cells; all others hold air.
+fn interleaved(flow: &Flow, active: &ActiveRows) -> Vec<Gas> {
+    let [width, height, depth] = flow.grid.size;
+    let [_, plane, row] = flow.grid.strides();
+    let [mixture, deficit] = &flow.contents.quantities;
+    let mut gas = vec![[0.0; 2]; flow.grid.len()];
+    gas.par_chunks_mut(plane).enumerate().for_each(|(padded_y, gas)| {
+        let y = padded_y.saturating_sub(GHOST_LAYERS).min(height - 1);
+        for padded_z in 0..depth + 2 * GHOST_LAYERS {
+            let z = padded_z.saturating_sub(GHOST_LAYERS).min(depth - 1);
+            let cells = active.row(y, z);
+            if cells.is_empty() {
+                continue;
+            }
+            let first = if cells.start == 0 { 0 } else { cells.start + GHOST_LAYERS };
+            let end = cells.end + if cells.end == width { 2 * GHOST_LAYERS } else { GHOST_LAYERS };
+            let values = padded_y * plane + padded_z * row;
+            for x in first..end {
+                gas[padded_z * row + x] = [mixture[values + x], deficit[values + x]];
+            }
+        }
+    });
+    gas
+}
+
+/// Continues gas into solids from the cells beside them: the splines around a point at the surface of a solid read cells inside of it, and a sheet would follow
+/// their steps if these held air.
+fn continue_into_solids(flow: &Flow, gas: &mut [Gas]) {
     /// Cells that splines and the lookups of rays reach into a solid.
     const LAYERS: usize = 3;
     if flow.solids.is_empty() {
-        return None;
+        return;
     }
     let [right, above, behind] = flow.grid.strides();
-    let mut fields = flow.contents.quantities.clone();
     let mut is_known: Vec<bool> = (0..flow.grid.len()).map(|index| !flow.solids.contains(index)).collect();
     let mut unknown: Vec<usize> = (0..is_known.len()).filter(|index| !is_known[*index]).collect();
     for _ in 0..LAYERS {
@@ -269,7 +193,7 @@ fn continued_into_solids(flow: &Flow) -> Option<[Vec<f32>; 2]> {
                 [index - right, index + right, index - above, index + above, index - behind, index + behind];
             let (mut sums, mut count) = ([0.0; 2], 0.0);
             for neighbor in neighbors.into_iter().filter(|neighbor| is_known[*neighbor]) {
-                (0..2).for_each(|field| sums[field] += fields[field][neighbor]);
+                (0..2).for_each(|field| sums[field] += gas[neighbor][field]);
                 count += 1.0;
             }
             if count > 0.0 {
@@ -277,12 +201,11 @@ fn continued_into_solids(flow: &Flow) -> Option<[Vec<f32>; 2]> {
             }
         }
         for (index, values) in reached {
-            (0..2).for_each(|field| fields[field][index] = values[field]);
+            gas[index] = values;
             is_known[index] = true;
         }
         unknown.retain(|index| !is_known[*index]);
     }
-    Some(fields)
 }
 
 /// Velocity at the centers of cells.

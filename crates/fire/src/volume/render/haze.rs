@@ -3,11 +3,12 @@
 use bansho_base::{
     host::parallel::prelude::*,
     image::{Image, Rect},
-    math::{DVec2, DVec3},
+    math::{self, DVec2, DVec3},
     phenomenon::strip::View,
 };
+use fearless_simd::{Simd, dispatch};
 
-use super::{field::GasField, march::Ray};
+use super::{blocks::BlockContents, field::GasField, rays::Ray};
 use crate::{particles::render::refractivity, volume::fuel::Mixture};
 
 /// Side of a cell of the picture in which one path is computed, pixels.
@@ -23,7 +24,7 @@ pub(crate) struct HeatHaze {
 
 /// Gas, and how strongly it refracts.
 pub(crate) struct Refraction<'a> {
-    pub(crate) field: &'a GasField<'a>,
+    pub(crate) field: &'a GasField,
     pub(crate) mixture: Mixture,
     pub(crate) gain: f64,
     /// Interval of depth of the gas, m.
@@ -45,7 +46,7 @@ impl HeatHaze {
             .map(|index| {
                 let place = |cell: usize, first: usize| ((first + cell) as f64 - 1.0) * CELL as f64;
                 let pixel = DVec2::new(place(index % columns, first_column), place(index / columns, first_row));
-                refraction.path_pixels(view, pixel)
+                dispatch!(math::simd::level(), simd => refraction.path_pixels(simd, view, pixel))
             })
             .collect();
         if paths.iter().all(|path| *path == 0.0) {
@@ -91,7 +92,8 @@ fn spline_slope(t: f32) -> [f32; 3] {
 
 impl Refraction<'_> {
     /// Difference of the optical path to that through air, in pixels at the depth of the gas.
-    fn path_pixels(&self, view: &View, pixel: DVec2) -> f32 {
+    #[inline(always)]
+    fn path_pixels<S: Simd>(&self, simd: S, view: &View, pixel: DVec2) -> f32 {
         let Some(direction) = view.camera.direction(pixel) else { return 0.0 };
         let Some([low, high]) = self.field.seen_corners() else { return 0.0 };
         let ray = Ray::new(self.field, view.camera.position, direction);
@@ -103,9 +105,12 @@ impl Refraction<'_> {
         while number * step < far {
             let place = ray.at(number * step);
             number += 1.0;
-            let mixture = self.field.mixture(place);
+            if self.field.blocks.at(place) == BlockContents::Nothing {
+                continue;
+            }
+            let [mixture, deficit] = self.field.gas(simd, place);
             if mixture > 1e-3 {
-                let kelvin = self.mixture.temperature_k(mixture, self.field.deficit(place));
+                let kelvin = self.mixture.temperature_k(mixture, deficit);
                 sum += refractivity(f64::from(kelvin)) - air;
             }
         }

@@ -1,9 +1,16 @@
 //! Drawing of the gas: rays through the grid.
 
+pub(crate) mod blocks;
 pub(crate) mod field;
 pub(crate) mod haze;
 pub(crate) mod lights;
-pub(crate) mod march;
+mod march;
+mod nodes;
+mod optics;
 pub(crate) mod prepared;
-pub(crate) mod sheet;
+mod rays;
+pub(crate) mod reference;
+mod sheet;
 pub(crate) mod smoke;
+#[cfg(test)]
+mod tests;

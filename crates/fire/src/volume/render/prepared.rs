@@ -5,45 +5,47 @@ use std::sync::OnceLock;
 use bansho_base::{
     camera::Lens,
     color,
-    host::{
-        observer::{Cancelled, Observer, check},
-        once::get_or_compute,
-    },
+    host::{once::get_or_compute, parallel::prelude::*},
     image::Rect,
     math::{self, DVec2, DVec3},
     phenomenon::{
         Deflection, Prepared,
         strip::{AovDescriptor, AovRule, DepthInterval, Strip, View},
-        surroundings::{Light, Surroundings},
     },
 };
-
+use bansho_fluid::Grid;
 use fearless_simd::dispatch;
 
 use super::{
-    field::{GasField, SeenMixtures},
+    blocks::SeenMixtures,
+    field::GasField,
     haze::{HeatHaze, Refraction},
-    march::{Gathered, Ray, RayMarcher},
-    sheet::{LAST_SOOT, SheetTable},
+    march::TilePart,
+    nodes::TILE,
+    optics::{GasOptics, LEAST_SEEN},
+    rays::{GasRays, Gathered, TimeSamples},
     smoke::SmokeLight,
 };
 use crate::{
     chemiluminescence_color,
     particles::render::VISIBLE_SOOT_ABSORPTION,
     sparks::SparkStreak,
-    volume::{fuel::Mixture, parameters::VolumeRenderingParameters},
+    volume::{
+        fuel::{LAST_SOOT, Mixture},
+        parameters::VolumeRenderingParameters,
+    },
 };
 
 /// Extinction of visible light by the smoke of flames, m^2 per kg of soot (Mulholland and Croarkin 2000).
 const SMOKE_EXTINCTION: f64 = 8700.0;
-/// Longest way of gas in one time sample of an exposure, cells.
-const STREAK_CELLS: f64 = 2.5;
-/// Most time samples.
-const MAX_TIME_SAMPLES: f64 = 8.0;
-/// Mixture fraction, over the stoichiometric, from which on gas is seen if it has no smoke.
-const LEAST_SEEN: f32 = 0.8;
-/// The same if it has. Less is not drawn, and what is drawn counts from here, so that smoke has no edge where it ends.
+/// Mixture fraction, over the stoichiometric, from which on smoke is seen. Less is not drawn, and what is drawn counts from here, so that smoke has no edge where it
+/// ends.
 const LEAST_SMOKE: f32 = 0.004;
+
+/// Rows of pixels that are computed together where nothing but gas is in the picture. Bands are at multiples of it in the picture.
+const BAND: usize = 32;
+/// Rows of a strip, as pictures are usually divided; others are slower.
+const STRIP_ROWS: usize = 8;
 
 /// AOVs of a volume flame, in the order of a strip's planes.
 pub(crate) const AOVS: &[AovDescriptor] = &[
@@ -88,7 +90,6 @@ pub(crate) const AOVS: &[AovDescriptor] = &[
 /// The gas of one state as the renderer sees it.
 #[derive(Clone, Copy)]
 pub(crate) struct RenderedGas<'a> {
-    pub(crate) sheet: &'a SheetTable,
     pub(crate) mixture: Mixture,
     pub(crate) rendering: &'a VolumeRenderingParameters,
     /// Largest volume fraction of soot.
@@ -108,22 +109,44 @@ impl RenderedGas<'_> {
             [LEAST_SEEN, LEAST_SMOKE, LAST_SOOT].map(|relative| relative * self.mixture.stoichiometric);
         SeenMixtures { smoke: if has_smoke { least_smoke } else { least_sheet }, sheet: least_sheet, last }
     }
+
+    /// What gas emits and absorbs.
+    pub(crate) fn optics(&self) -> GasOptics {
+        let gain = self.rendering.soot_gain;
+        GasOptics {
+            mixture: self.mixture,
+            soot_absorption: (self.soot * VISIBLE_SOOT_ABSORPTION * gain) as f32,
+            smoke_extinction: (self.smoke_yield * SMOKE_EXTINCTION * gain) as f32,
+            least_smoke: self.seen().smoke,
+            blue: self.rendering.blue as f32,
+        }
+    }
+
+    /// The parts of the exposure of a view.
+    pub(crate) fn time_samples(&self, view: &View, grid: &Grid) -> TimeSamples {
+        let offset = view.shutter.middle() - self.time;
+        TimeSamples::new(offset, view.shutter.duration(), self.speed / grid.spacing)
+    }
 }
 
 /// The gas of one frame, ready to be drawn into strips.
 pub(crate) struct PreparedVolume<'a> {
     gas: RenderedGas<'a>,
-    field: GasField<'a>,
+    field: GasField,
     /// Length of a step of a ray, cells.
     step: f64,
     view: &'a View,
     smoke_light: Option<SmokeLight>,
+    times: TimeSamples,
+    /// Distance between rays along which gas is looked up, pixels.
+    node_pixels: usize,
     sparks: Vec<SparkStreak>,
     /// Pixels in which gas may be seen, and its interval of depth.
     rect: Rect,
     depths: DepthInterval,
-    time_samples: usize,
     haze: OnceLock<Option<HeatHaze>>,
+    /// The pixels of each tile and band of rows, where neither slices nor plates cut the gas.
+    bands: Vec<OnceLock<Option<TilePixels>>>,
 }
 
 /// The interval of depth of a box, m.
@@ -165,24 +188,23 @@ fn rect_of_box(box_corners: [DVec3; 2], view: &View) -> Rect {
 impl<'a> PreparedVolume<'a> {
     pub(crate) fn new(
         gas: RenderedGas<'a>,
-        field: GasField<'a>,
+        field: GasField,
+        smoke_light: Option<SmokeLight>,
         step: f64,
-        lights: &[Light],
         sparks: Vec<SparkStreak>,
         view: &'a View,
-        surroundings: &Surroundings,
-        observer: &dyn Observer,
-    ) -> Result<Self, Cancelled> {
-        check(observer)?;
+    ) -> Self {
         let corners = field.seen_corners();
-        let has_smoke = gas.smoke_yield > 0.0;
-        let smoke_light =
-            if has_smoke { SmokeLight::new(&field, lights, surroundings, gas.rendering.smoke_albedo) } else { None };
-        let streak = gas.speed * view.shutter.duration() / field.grid.spacing;
-        Ok(Self {
-            rect: corners.map_or(Rect::default(), |corners| rect_of_box(corners, view)),
-            depths: corners.map_or(DepthInterval { near: 0.0, far: 0.0 }, |corners| depths_of_box(corners, view)),
-            time_samples: (streak / STREAK_CELLS).ceil().clamp(1.0, MAX_TIME_SAMPLES) as usize,
+        let nowhere = DepthInterval { near: 0.0, far: 0.0 };
+        let depths = corners.map_or(nowhere, |corners| depths_of_box(corners, view));
+        let rect = corners.map_or(Rect::default(), |corners| rect_of_box(corners, view));
+        let count = |first: usize, end: usize, side: usize| end.div_ceil(side) - first / side;
+        let bands = count(rect.x, rect.right(), TILE) * count(rect.y, rect.bottom(), BAND);
+        Self {
+            rect,
+            depths,
+            times: gas.time_samples(view, &field.grid),
+            node_pixels: GasRays::node_pixels(&field, &view.camera, depths.far),
             smoke_light,
             gas,
             field,
@@ -190,26 +212,34 @@ impl<'a> PreparedVolume<'a> {
             view,
             sparks,
             haze: OnceLock::new(),
-        })
+            bands: std::iter::repeat_with(OnceLock::new).take(bands).collect(),
+        }
     }
 
-    fn marcher(&self) -> RayMarcher<'_> {
-        let RenderedGas { rendering, .. } = self.gas;
-        RayMarcher {
+    pub(super) fn rays(&self) -> GasRays<'_> {
+        GasRays {
             field: &self.field,
-            step: self.step,
-            sheet: self.gas.sheet,
-            mixture: self.gas.mixture,
-            black_body: color::black_body(),
-            soot_absorption: (self.gas.soot * VISIBLE_SOOT_ABSORPTION * rendering.soot_gain) as f32,
-            smoke_extinction: (self.gas.smoke_yield * SMOKE_EXTINCTION * rendering.soot_gain) as f32,
-            least_smoke: self.gas.seen().smoke,
+            optics: self.gas.optics(),
             smoke_light: self.smoke_light.as_ref(),
-            blue: rendering.blue as f32,
-            offset_s: (self.view.shutter.middle() - self.gas.time) as f32,
-            exposure_s: self.view.shutter.duration() as f32,
-            time_samples: self.time_samples,
+            times: self.times,
+            camera: &self.view.camera,
+            step: self.step,
+            node_pixels: self.node_pixels,
         }
+    }
+
+    /// Luminance of all pixels that may show gas, by rays one at a time.
+    pub(crate) fn single_ray_luminance(&self) -> Vec<f32> {
+        let (rays, rect) = (self.rays(), self.rect);
+        let range = [self.depths.near, self.depths.far];
+        let row = |y: usize| {
+            (rect.x..rect.right()).map(move |x| (x, y)).map(|(x, y)| {
+                let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+                let gathered = dispatch!(math::simd::level(), simd => rays.gather_single(simd, pixel, range));
+                gathered.map_or(0.0, |gathered| gathered.luminance + color::luminance(gathered.scattered))
+            })
+        };
+        (rect.y..rect.bottom()).into_par_iter().flat_map_iter(row).collect()
     }
 
     fn haze(&self) -> Option<&HeatHaze> {
@@ -231,35 +261,62 @@ impl<'a> PreparedVolume<'a> {
         if rect.is_empty() || near >= far {
             return;
         }
-        dispatch!(math::simd::level(), _simd => self.draw_rows(rect, [near, far], strip));
+        let is_whole = near == self.depths.near && far == self.depths.far;
+        let (first_tile, tiles) = (rect.x / TILE, rect.right().div_ceil(TILE) - rect.x / TILE);
+        // Strips of the same band begin at different tiles, so that threads do not wait for each other.
+        let begin = rect.y / STRIP_ROWS * tiles * STRIP_ROWS / BAND;
+        for number in 0..tiles {
+            let x = (first_tile + (begin + number) % tiles) * TILE;
+            let tile_rect = Rect { x, width: TILE, ..rect }.intersection(&rect);
+            if is_whole && !strip.has_plate() && strip.aovs.is_empty() {
+                self.draw_from_bands(tile_rect, strip);
+            } else {
+                self.draw_tile(tile_rect, [near, far], strip);
+            }
+        }
     }
 
-    /// Draws the pixels of `rect` between two depths, m.
-    #[inline(always)]
-    fn draw_rows(&self, rect: Rect, [near, far]: [f64; 2], strip: &mut Strip) {
-        let marcher = self.marcher();
-        let blue = chemiluminescence_color();
-        let mut row = RowBuffers::new(rect.width);
-        for y in rect.y..rect.bottom() {
-            let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
-            let mut has_gas = false;
-            for x in 0..rect.width {
-                let pixel = DVec2::new((rect.x + x) as f64 + 0.5, y as f64 + 0.5);
-                let far = far.min(f64::from(strip.plate_depth(first + x)));
-                let gathered = self.view.camera.direction(pixel).and_then(|direction| {
-                    let ray = Ray::new(&self.field, self.view.camera.position, direction);
-                    marcher.gather(&ray, [near, far])
-                });
-                row.set(x, gathered.as_ref(), &marcher, blue);
-                let Some(gathered) = gathered else { continue };
-                has_gas = true;
-                if !strip.aovs.is_empty() {
-                    self.write_aovs(&gathered, first + x, strip);
-                }
+    /// Draws a part of a tile.
+    fn draw_tile(&self, rect: Rect, depths: [f64; 2], strip: &mut Strip) {
+        let Rect { x: column, y: row, width, .. } = strip.rect;
+        let plate_depth = |x: usize, y: usize| strip.plate_depth((y - row) * width + x - column);
+        let part = TilePart { rect, depths, plate_depth: &plate_depth, has_motion: !strip.aovs.is_empty() };
+        let rays = self.rays();
+        let gathered = dispatch!(math::simd::level(), simd => rays.gather_tile(simd, &part));
+        let Some(gathered) = gathered else { return };
+        if !strip.aovs.is_empty() {
+            self.write_tile_aovs(rect, &gathered, strip);
+        }
+        TilePixels::new(rect, &gathered).add_to(strip);
+    }
+
+    /// Draws a part of a tile from pixels that are computed for several strips at once: neighboring strips would look up the same nodes.
+    fn draw_from_bands(&self, rect: Rect, strip: &mut Strip) {
+        let tile = (rect.x / TILE) - self.rect.x / TILE;
+        let tiles = (self.rect.right() - 1) / TILE - self.rect.x / TILE + 1;
+        for band in rect.y / BAND..=(rect.bottom() - 1) / BAND {
+            let index = (band - self.rect.y / BAND) * tiles + tile;
+            // Waiting for another thread is safe: what it computes does not use the thread pool.
+            let pixels = self.bands[index].get_or_init(|| {
+                let whole = Rect { x: rect.x / TILE * TILE, y: band * BAND, width: TILE, height: BAND };
+                let rect = whole.intersection(&self.rect);
+                let depths = [self.depths.near, self.depths.far];
+                let part = TilePart { rect, depths, plate_depth: &|_, _| f32::INFINITY, has_motion: false };
+                let rays = self.rays();
+                let gathered = dispatch!(math::simd::level(), simd => rays.gather_tile(simd, &part));
+                gathered.map(|gathered| TilePixels::new(rect, &gathered))
+            });
+            if let Some(pixels) = pixels {
+                pixels.add_to(strip);
             }
-            if has_gas {
-                let [red, green, blue] = &row.radiance;
-                strip.add_row_behind(first, [red, green, blue], Some(&row.opacity), &row.depth);
+        }
+    }
+
+    fn write_tile_aovs(&self, rect: Rect, gathered: &[Gathered], strip: &mut Strip) {
+        for (row, gathered) in gathered.chunks_exact(rect.width).enumerate() {
+            let first = (rect.y + row - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
+            for (x, gathered) in gathered.iter().enumerate().filter(|(_, gathered)| gathered.is_visible()) {
+                self.write_aovs(gathered, first + x, strip);
             }
         }
     }
@@ -301,33 +358,55 @@ impl<'a> PreparedVolume<'a> {
     }
 }
 
-/// A row of pixels before it is added to a strip.
-struct RowBuffers {
+/// Pixels of a part of a tile.
+struct TilePixels {
+    rect: Rect,
     radiance: [Vec<f32>; 3],
     opacity: Vec<f32>,
     depth: Vec<f32>,
+    /// Whether there is gas in a row.
+    has_gas: Vec<bool>,
 }
 
-impl RowBuffers {
-    fn new(width: usize) -> Self {
-        let zeros = || vec![0.0; width];
-        Self { radiance: [zeros(), zeros(), zeros()], opacity: zeros(), depth: zeros() }
+impl TilePixels {
+    fn new(rect: Rect, gathered: &[Gathered]) -> Self {
+        let zeros = || vec![0.0; gathered.len()];
+        let mut pixels = Self {
+            rect,
+            radiance: [zeros(), zeros(), zeros()],
+            opacity: zeros(),
+            depth: vec![f32::INFINITY; gathered.len()],
+            has_gas: vec![false; rect.height],
+        };
+        let (black_body, blue) = (color::black_body(), chemiluminescence_color());
+        for (index, gathered) in gathered.iter().enumerate().filter(|(_, gathered)| gathered.is_visible()) {
+            // The light of a sum of black bodies has nearly the color of one at their mean temperature.
+            let kelvin = if gathered.luminance > 0.0 { gathered.luminance_kelvin / gathered.luminance } else { 0.0 };
+            let glow = black_body.radiance(kelvin);
+            let per_luminance = gathered.luminance / color::luminance(glow).max(f32::MIN_POSITIVE);
+            for c in 0..3 {
+                pixels.radiance[c][index] = glow[c] * per_luminance + gathered.blue * blue[c] + gathered.scattered[c];
+            }
+            (pixels.opacity[index], pixels.depth[index]) = (gathered.opacity, gathered.depth);
+            pixels.has_gas[index / rect.width] = true;
+        }
+        pixels
     }
 
-    fn set(&mut self, x: usize, gathered: Option<&Gathered>, marcher: &RayMarcher, blue: [f32; 3]) {
-        let Some(gathered) = gathered else {
-            self.radiance.iter_mut().for_each(|plane| plane[x] = 0.0);
-            (self.opacity[x], self.depth[x]) = (0.0, f32::INFINITY);
-            return;
-        };
-        // The light of a sum of black bodies has nearly the color of one at their mean temperature.
-        let kelvin = if gathered.luminance > 0.0 { gathered.luminance_kelvin / gathered.luminance } else { 0.0 };
-        let glow = marcher.black_body.radiance(kelvin);
-        let per_luminance = gathered.luminance / color::luminance(glow).max(f32::MIN_POSITIVE);
-        for c in 0..3 {
-            self.radiance[c][x] = glow[c] * per_luminance + gathered.blue * blue[c] + gathered.scattered[c];
+    /// Adds those that are in a strip.
+    fn add_to(&self, strip: &mut Strip) {
+        let rect = self.rect.intersection(&strip.rect);
+        for y in rect.y..rect.bottom() {
+            let row = y - self.rect.y;
+            if !self.has_gas[row] {
+                continue;
+            }
+            let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
+            let begin = row * self.rect.width + rect.x - self.rect.x;
+            let pixels = begin..begin + rect.width;
+            let [red, green, blue] = self.radiance.each_ref().map(|plane| &plane[pixels.clone()]);
+            strip.add_row_behind(first, [red, green, blue], Some(&self.opacity[pixels.clone()]), &self.depth[pixels]);
         }
-        (self.opacity[x], self.depth[x]) = (gathered.opacity, gathered.depth);
     }
 }
 
