@@ -1,19 +1,23 @@
 //! The light of fires that rain scatters toward the camera, when the fires have changed since the last frame; compared with the naive algorithm: one line of
-//! sight, one light and one sample at a time, in double precision, at the same corners of the same grids.
+//! sight, one light and one sample at a time, in double precision, at the same corners of the same grids. And the same behind posts that move: with shadow maps that
+//! are made anew, and naively with a ray through the distances of the posts from each sample.
 
 use std::{hint::black_box, sync::Arc};
 
 use bansho_base::{
     camera::CameraParameters,
     host::observer::Unobserved,
-    math::{self, DVec2, DVec3},
+    math::{self, DQuat, DVec2, DVec3},
     parameters::animated::Animated,
     phenomenon::{
         Run,
         strip::{Shutter, View},
-        surroundings::{Emitter, Light, Publication, Surroundings},
+        surroundings::{Emitter, Light, Occluder, Publication, Surroundings},
     },
-    world::wind::{Wind, WindParameters},
+    world::{
+        shadow,
+        wind::{Wind, WindParameters},
+    },
 };
 use bansho_rain::{Rain, RainParameters, RainRun, lighting::drop_phase_function::DropPhaseFunction};
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -47,6 +51,17 @@ fn lights(frame: u32) -> Vec<Light> {
     (0..4).map(flame).collect()
 }
 
+/// Three posts between the flames and the camera.
+fn posts(frame: u32) -> Vec<Occluder> {
+    let post = |index: u32| Occluder::Cylinder {
+        center: DVec3::new(0.5 * f64::from(index) - 0.5 + 1e-3 * f64::from(frame % 40), 1.0, -2.8),
+        radius: 0.06,
+        half_height: 1.0,
+        rotation: DQuat::IDENTITY,
+    };
+    (0..3).map(post).collect()
+}
+
 /// Pixels at which the light is integrated: corners of a grid of 16 pixels, and of 4 pixels near each light, with the lights that are integrated there.
 fn corners(view: &View, lights: &[Light]) -> Vec<(DVec2, Vec<Light>)> {
     let grid = |low: [i32; 2], high: [i32; 2], step: usize, lights: &[Light]| {
@@ -76,6 +91,7 @@ fn naive(
     lights: &[Light],
     phase_function: &DropPhaseFunction,
     distances: &[f64],
+    casters: &[Occluder],
 ) -> Vec<[f64; 3]> {
     let mut sums = vec![[0.0; 3]];
     for pair in distances.windows(2) {
@@ -92,7 +108,9 @@ fn naive(
                 let (distance, length) = (nearest + offset, step * (h * h + offset * offset) / h);
                 let incident = light.incident_light(eye + line * distance);
                 let phase = phase_function.phase(incident.toward.dot(line) as f32);
-                let weight = EXTINCTION * length * math::exp(-EXTINCTION * (distance + incident.distance));
+                let (point, reach) = (eye + line * distance, incident.distance - 0.1);
+                let visible = shadow::visibility(casters, point, incident.toward, reach, 0.1 / incident.distance);
+                let weight = visible * EXTINCTION * length * math::exp(-EXTINCTION * (distance + incident.distance));
                 for c in 0..3 {
                     let scattered = f64::from(phase[c]) * (0.25 / std::f64::consts::PI);
                     sum[c] += f64::from(incident.illuminance[c]) * scattered * weight;
@@ -114,28 +132,36 @@ fn scattering(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("light of fires in rain 1280x720, 1 thread");
     group.sample_size(10);
     let mut frame = 0;
-    group.bench_function("lines of sight in lanes", |bencher| {
-        bencher.iter(|| {
-            frame += 1;
-            let others = Publication { lights: lights(frame), ..Publication::default() };
-            let surroundings = Surroundings { others, ..Surroundings::from_wind(&wind) };
-            pool.install(|| black_box(rain.prepare(&view, &surroundings, &Unobserved).is_ok()));
+    for (name, has_posts) in [("lines of sight in lanes", false), ("the same behind posts, with shadow maps", true)] {
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                frame += 1;
+                let shadow_casters = if has_posts { posts(frame) } else { Vec::new() };
+                let others = Publication { lights: lights(frame), shadow_casters, ..Publication::default() };
+                let surroundings = Surroundings { others, ..Surroundings::from_wind(&wind) };
+                pool.install(|| black_box(rain.prepare(&view, &surroundings, &Unobserved).is_ok()));
+            });
         });
-    });
+    }
     let phase_function = DropPhaseFunction::new();
     let mut distances = vec![0.0, 0.5];
     while distances[distances.len() - 1] < 100.0 {
         distances.push(1.25 * distances[distances.len() - 1]);
     }
-    group.bench_function("naive: one sample at a time", |bencher| {
-        bencher.iter(|| {
-            frame += 1;
-            for (pixel, lights) in corners(&view, &lights(frame)) {
-                let Some(direction) = view.camera.direction(pixel) else { continue };
-                black_box(naive(view.camera.position, direction.normalize(), &lights, &phase_function, &distances));
-            }
+    for (name, has_posts) in [("naive: one sample at a time", false), ("naive: the same with a ray to the light", true)]
+    {
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                frame += 1;
+                let casters = if has_posts { posts(frame) } else { Vec::new() };
+                for (pixel, lights) in corners(&view, &lights(frame)) {
+                    let Some(direction) = view.camera.direction(pixel) else { continue };
+                    let line = direction.normalize();
+                    black_box(naive(view.camera.position, line, &lights, &phase_function, &distances, &casters));
+                }
+            });
         });
-    });
+    }
     group.finish();
 }
 

@@ -12,6 +12,8 @@
 //! - K. Garg and S. K. Nayar, "Photorealistic rendering of rain streaks" (2006): speckle of oscillating drops; frequencies of Lord Rayleigh (1879).
 //! - C. Kulla and M. Fajardo, "Importance sampling techniques for path tracing in participating media" (2012): equiangular sampling.
 //! - R. L. Cook, J. Halstead, M. Planck and D. Ryu, "Stochastic simplification of aggregate detail" (2007): far billboards.
+//! - L. Williams, "Casting curved shadows on curved surfaces" (1978); W. Reeves, D. Salesin and R. Cook, "Rendering antialiased shadows with depth maps" (1987); J. Hart,
+//!   "Sphere tracing" (1996): shadow maps.
 //! - H. Koschmieder (1924): visibility, and the radiance of infinitely deep rain.
 //!
 //! # Equations
@@ -36,13 +38,14 @@
 //! | phase function | p: light that a drop scatters by angle | [`DropPhaseFunction::phase`](lighting::drop_phase_function::DropPhaseFunction::phase) |
 //! | sky light through a drop | integral of `p L` over the sky | [`DropPhaseFunction::mean_radiance`](lighting::drop_phase_function::DropPhaseFunction::mean_radiance) |
 //! | single scattering | `integral of beta E p / (4 pi) e^-tau ds` along the line of sight | `lighting::equiangular::SightLineIntegrator::add_lamp` |
+//! | shadow map | `(x, y) / (1 + z)`: stereographic projection of the direction (x, y, z) from a lamp | `lighting::shadow_map::ShadowMap::visibility` |
 //! | gust displacement | `integral of g(s) (1 - s / memory) ds`: displacement of drops by gusts | `drops::gust::GustHistory::add_weights` |
 //!
 //! # Data flow
 //! 1. [`Rain::new`] divides [`RainParameters`]' diameters into bins. Terminal velocities follow each frame from the scene's air.
 //! 2. For a frame, `shutter_cameras` holds the cameras when the shutter opens, at its middle and when it closes, and `drops::shutter_state` the state of
 //!    the rain: a `lattice` of cells for each diameter, displaced by the wind, with `gust`s on top.
-//! 3. `lighting` prepares lamps, the sky through drops at the corners of a tile grid, and single scattering along lines of sight.
+//! 3. `lighting` prepares lamps, their shadow maps, the sky through drops at the corners of a tile grid, and single scattering along lines of sight.
 //! 4. `streaks::project` visits the visible cells, nearest first, and turns batches of sixteen drops (`streaks::project_lanes`, of a fisheye or a panorama
 //!    `streaks::project_curvilinear`) into lit streaks; a long exposure is drawn in parts (`streaks::exposure_parts`). On
 //!    [`billboards`], drops come from the positions of a streak texture; on the ground `streaks::splashes` adds droplets. With `method = "textures"`,

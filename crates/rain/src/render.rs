@@ -9,7 +9,7 @@ use bansho_base::{
     phenomenon::{
         Prepared,
         strip::{DepthInterval, Strip, View},
-        surroundings::Surroundings,
+        surroundings::{Publication, Surroundings},
     },
     world::sky::Sky,
 };
@@ -24,6 +24,7 @@ use crate::{
         LightCaches,
         drop_lighting::{DropLighting, PreparedLight},
         extinction::{ExtinctionEfficiency, extinction, visibility},
+        lamp_shadows::LampShadows,
         single_scattering::SingleScattering,
         sky::SkyOnDrops,
     },
@@ -67,8 +68,14 @@ impl<'a> PreparedRain<'a> {
         surroundings: &'a Surroundings,
     ) -> Self {
         let extinction = rain.extinction(view.shutter.middle());
-        let lights = &surroundings.others.lights;
-        let lighting = DropLighting { scattering: &rain.optics.scattering, lights, extinction: extinction.all };
+        let Publication { lights, shadow_casters, .. } = &surroundings.others;
+        // The paper ignores what is between a lamp and the rain.
+        let shadows = match rain.parameters.method {
+            Method::Textures => LampShadows::default(),
+            Method::Billboards | Method::Drops => light_caches.lamp_shadows.of_lights(lights, shadow_casters),
+        };
+        let scattering = &rain.optics.scattering;
+        let lighting = DropLighting { scattering, lights, shadows: &shadows, extinction: extinction.all };
         let sky_lighting = light_caches.skies.for_view(&rain.optics.phase_function, view, surroundings.sky);
         let shutter_state = rain.shutter_state(view, surroundings);
         let mut textured = None;

@@ -5,6 +5,8 @@
 //! the interval from `u1` to `u2` under the angle `atan2(h (u2 - u1), h^2 + u1 u2)`. In steps of equal angle `ds / r^2 = d(angle) / h`, so the
 //! integrand has no peak near the lamp. Positions are counted from the start of an interval, which needs no tangent and keeps single precision sufficient.
 
+use std::sync::Arc;
+
 use bansho_base::{
     math::{
         DVec3, approximations,
@@ -13,7 +15,9 @@ use bansho_base::{
     phenomenon::surroundings::{Emitter, Light},
 };
 
-use super::{drop_lighting::ScatteringTable, extinction::ExtinctionProfile};
+use super::{
+    drop_lighting::ScatteringTable, extinction::ExtinctionProfile, lamp_shadows::LampShadows, shadow_map::ShadowMap,
+};
 use crate::lanes::{LaneArray, ZERO_LANES};
 
 /// Angle subtended at a lamp by one sample, radians.
@@ -24,6 +28,8 @@ pub(super) const MIN_LAMP_DISTANCE: f64 = 0.02;
 const MAX_LAMP_DISTANCE: f64 = 1e9;
 /// Square of the smallest distance between a lamp and a drop, m^2.
 const MIN_SQUARE: f64 = 1e-12;
+/// Largest number of points of a sample at which the shadow of a solid is looked up.
+const MAX_SHADOW_POINTS: f32 = 24.0;
 const TURNS_PER_RADIAN: f32 = (1.0 / std::f64::consts::TAU) as f32;
 
 /// An interval of distances from the eye that lamps light.
@@ -42,6 +48,7 @@ pub(super) struct Interval {
 pub(super) struct SightLineIntegrator<'a> {
     pub(super) scattering: &'a ScatteringTable,
     pub(super) extinction: ExtinctionProfile<'a>,
+    pub(super) shadows: &'a LampShadows,
     /// Extinction coefficient between a light and a drop, 1/m.
     pub(super) light_extinction: f32,
     pub(super) intervals: &'a [Interval],
@@ -58,6 +65,8 @@ struct LampAtLine {
     height: f32,
     /// The square of that distance, m^2, without the bound.
     height_squared: f32,
+    /// The vector from the lamp to that point, m.
+    from_lamp: [f32; 3],
     /// Square of the distance within which the illuminance is constant, m^2.
     min_square: f32,
     /// Cone of a spot: `falloff_slope (cos angle) + falloff_offset`, with `r cos angle = cone_offset + cone_slope u`.
@@ -138,10 +147,52 @@ impl LampAtLine {
             nearest,
             height: height.max(MIN_LAMP_DISTANCE) as f32,
             height_squared: (height * height) as f32,
+            from_lamp: (direction * nearest - offset).as_vec3().to_array(),
             min_square: min_square as f32,
             cone: cone.map(|value| value as f32),
             falloff: falloff.map(|value| value as f32),
         })
+    }
+}
+
+/// A line of sight, and the shadows in the light of a lamp.
+struct LineOfSight<'a> {
+    /// Unit vector.
+    direction: [f32; 3],
+    shadow: Option<&'a Arc<ShadowMap>>,
+}
+
+/// Sixteen samples in the light of a lamp.
+struct LitSamples {
+    /// `beta e^-tau ds / r^2`, with the lamp's cone.
+    weights: LaneArray,
+    /// Sine of half the scattering angle.
+    half_sines: LaneArray,
+    /// Distance u from the point nearest to the lamp, m.
+    positions: LaneArray,
+}
+
+impl LampAtLine {
+    /// Fraction of a sample around the position `u` (m), which subtends the angle `step` (radians) at the lamp, that no solid shadows: the mean over points in equal
+    /// steps of the angle, as many as cells of the shadow map.
+    #[inline(always)]
+    fn visible_fraction(&self, shadow: &ShadowMap, direction: &[f32; 3], u: f32, step: f32) -> f32 {
+        let h = self.height;
+        let count = (step / shadow.cell_angle()).ceil().simd_max(1.0).simd_min(MAX_SHADOW_POINTS);
+        let per_point = step / count;
+        let mut visible = 0.0;
+        for index in 0..count as i32 {
+            let turns = per_point * (index as f32 + 0.5 - 0.5 * count) * TURNS_PER_RADIAN;
+            let (sine, cosine) = (approximations::sin_turns(turns), approximations::cos_turns(turns));
+            // h tan of the angle of u, turned: the addition theorem. Rounding must not lead beyond a right angle.
+            let position = h * u.fma(cosine, h * sine) / h.fma(cosine, -(u * sine)).simd_max(1e-6 * h);
+            let mut offset = self.from_lamp;
+            for axis in 0..3 {
+                offset[axis] = direction[axis].fma(position, offset[axis]);
+            }
+            visible += shadow.visibility(offset);
+        }
+        visible / count
     }
 }
 
@@ -173,7 +224,7 @@ impl SightLineIntegrator<'_> {
     fn add_lamp(&self, light: &Light, direction: DVec3, sums: &mut [[f32; 4]]) {
         let Some(lamp) = LampAtLine::new(light, self.eye, direction) else { return };
         let h = lamp.height;
-        let climb = direction.y as f32;
+        let line = LineOfSight { direction: direction.as_vec3().to_array(), shadow: self.shadows.of(&light.emitter) };
         let mut batch = SampleBatch::EMPTY;
         for (index, interval) in self.intervals.iter().enumerate() {
             let u = (interval.start - lamp.nearest) as f32;
@@ -185,20 +236,35 @@ impl SightLineIntegrator<'_> {
                 // Samples of different intervals share a batch: most intervals have a single one, and lanes would be idle.
                 batch.push(index, interval, u, step * (sample as f32 + 0.5), step);
                 if batch.count == LANES {
-                    self.add_batch(light, &lamp, climb, &batch, sums);
+                    self.add_batch(light, &lamp, &line, &batch, sums);
                     batch.count = 0;
                 }
             }
         }
         if batch.count > 0 {
             batch.clear_unused();
-            self.add_batch(light, &lamp, climb, &batch, sums);
+            self.add_batch(light, &lamp, &line, &batch, sums);
         }
     }
 
     #[inline(always)]
-    fn add_batch(&self, light: &Light, lamp: &LampAtLine, climb: f32, batch: &SampleBatch, sums: &mut [[f32; 4]]) {
-        let (weights, half_sines) = self.weights(lamp, climb, batch);
+    fn add_batch(
+        &self,
+        light: &Light,
+        lamp: &LampAtLine,
+        line: &LineOfSight,
+        batch: &SampleBatch,
+        sums: &mut [[f32; 4]],
+    ) {
+        let LitSamples { mut weights, half_sines, positions } = self.lit_samples(lamp, line.direction[1], batch);
+        if let Some(shadow) = line.shadow {
+            for i in 0..LANES {
+                // Neighboring samples are mostly all lit or none, so that this branch is predicted.
+                if weights[i] > 0.0 {
+                    weights[i] *= lamp.visible_fraction(shadow, &line.direction, positions[i], batch.step[i]);
+                }
+            }
+        }
         let mut total = 0.0;
         for i in 0..LANES {
             total += weights[i];
@@ -217,11 +283,12 @@ impl SightLineIntegrator<'_> {
         }
     }
 
-    /// `beta e^-tau ds / r^2` of sixteen samples, with the lamp's cone, and the sine of half the scattering angle.
+    /// The light of sixteen samples without shadows, on a line of sight that climbs by this height per meter.
     #[inline(always)]
-    fn weights(&self, lamp: &LampAtLine, climb: f32, batch: &SampleBatch) -> (LaneArray, LaneArray) {
+    fn lit_samples(&self, lamp: &LampAtLine, climb: f32, batch: &SampleBatch) -> LitSamples {
         let h = lamp.height;
         let (mut weights, mut half_sines, mut distances) = (ZERO_LANES, ZERO_LANES, ZERO_LANES);
+        let mut positions = ZERO_LANES;
         for i in 0..LANES {
             // The point at the angle from the start: the direction (h, u) at the lamp, turned by the angle.
             let turns = batch.angle[i] * TURNS_PER_RADIAN;
@@ -232,6 +299,7 @@ impl SightLineIntegrator<'_> {
             let advance = sine * from.fma(from, h * h) / h.fma(cosine, -(from * sine));
             let advance = advance.simd_max(0.0).simd_min(batch.width[i]);
             let u = from + advance;
+            positions[i] = u;
             // ds = (h^2 + u^2) / h da.
             let length = batch.step[i] * u.fma(u, h * h) / h;
             let square = u.fma(u, lamp.height_squared);
@@ -252,7 +320,7 @@ impl SightLineIntegrator<'_> {
         for i in 0..LANES {
             weights[i] *= extinction[i].simd_max(0.0);
         }
-        (weights, half_sines)
+        LitSamples { weights, half_sines, positions }
     }
 
     /// Adds the light of a lamp at infinity, whose illuminance is the same everywhere: one sample for each interval.
@@ -339,10 +407,13 @@ mod tests {
         let mut lit = 0;
         for emitter in emitters {
             let lights = [Light { emitter, intensity: [900.0, 500.0, 200.0] }];
-            let lighting = DropLighting { scattering: &rain.optics.scattering, lights: &lights, extinction: 0.02 };
+            let shadows = LampShadows::default();
+            let scattering = &rain.optics.scattering;
+            let lighting = DropLighting { scattering, lights: &lights, shadows: &shadows, extinction: 0.02 };
             let integrator = SightLineIntegrator {
                 scattering: lighting.scattering,
                 extinction: profile,
+                shadows: &shadows,
                 light_extinction: 0.02,
                 intervals: &intervals,
                 eye,
@@ -384,6 +455,7 @@ mod tests {
         let integrator = SightLineIntegrator {
             scattering: &rain.optics.scattering,
             extinction: ExtinctionProfile { shutter_state: &shutter_state, extinction },
+            shadows: &LampShadows::default(),
             light_extinction: 0.02,
             intervals: &intervals,
             eye: DVec3::ZERO,

@@ -22,6 +22,7 @@ use super::{
     drop_lighting::DropLighting,
     equiangular::{Interval, MIN_LAMP_DISTANCE, SightLineIntegrator},
     extinction::{ExtinctionProfile, RainExtinction},
+    lamp_shadows::LampShadows,
     tiles::{FINE_TILE, FINEST_TILE, GridPosition, TileGrid},
 };
 
@@ -48,8 +49,11 @@ impl InScattering {
 
     /// The light of some lamps at the corners of the picture's grid. Far from all lamps in the picture, every second corner is enough.
     fn over_picture(integrator: &SightLineIntegrator, tiles: &TileGrid, lights: &[Light], camera: &Camera) -> Self {
-        // The edge of a cone may be anywhere in the picture, not only near its lamp.
-        if lights.iter().any(|light| matches!(light.emitter, Emitter::Spot { .. })) {
+        // The edge of a cone or of a shadow may be anywhere in the picture, not only near its lamp.
+        let has_edge = |light: &Light| {
+            matches!(light.emitter, Emitter::Spot { .. }) || integrator.shadows.of(&light.emitter).is_some()
+        };
+        if lights.iter().any(has_edge) {
             return Self::new(integrator, tiles, lights);
         }
         let lamps: Vec<DVec2> = lights.iter().flat_map(|light| lamp_images(light, camera, SMOOTH_RADIUS)).collect();
@@ -192,6 +196,7 @@ struct ScatteringInputs {
     size: [usize; 2],
     eye: DVec3,
     lights: Vec<Light>,
+    shadows: LampShadows,
     /// Extinction coefficient between a light and a drop, 1/m.
     light_extinction: f64,
     extinction: RainExtinction,
@@ -271,6 +276,7 @@ impl InScatterIntegrator<'_> {
             size: view.size,
             eye: self.eye,
             lights: self.lighting.lights.to_vec(),
+            shadows: self.lighting.shadows.clone(),
             light_extinction: self.lighting.extinction,
             extinction,
             streak_distance: shutter_state.distance,
@@ -298,6 +304,7 @@ impl InScatterIntegrator<'_> {
         let integrator = SightLineIntegrator {
             scattering: self.lighting.scattering,
             extinction: self.extinction,
+            shadows: self.lighting.shadows,
             light_extinction: self.lighting.extinction as f32,
             intervals: &self.intervals(),
             eye: self.eye,
@@ -397,6 +404,7 @@ mod tests {
         let integrator = SightLineIntegrator {
             scattering: &rain.optics.scattering,
             extinction: ExtinctionProfile { shutter_state: &shutter_state, extinction },
+            shadows: &LampShadows::default(),
             light_extinction: 0.02,
             intervals: &intervals,
             eye: view.camera.position,

@@ -235,7 +235,8 @@ impl StreakProjection<'_> {
         let mut lit = ZERO_LANES;
         for i in 0..LANES {
             // As weights of 0 and 1: the light of all sixteen drops is computed without a branch.
-            lit[i] = if streaks.peak[i] >= min_peak { 1.0 } else { 0.0 };
+            let is_lit = (streaks.peak[i] >= min_peak) & (streaks.visible[i] != 0);
+            lit[i] = if is_lit { 1.0 } else { 0.0 };
         }
         let mut radiance = [[0.0; 3]; LANES];
         for light in self.lights {

@@ -17,6 +17,7 @@ use crate::{
         LightCaches,
         drop_lighting::{DropLighting, ScatteringTable},
         drop_phase_function::DropPhaseFunction,
+        lamp_shadows::LampShadows,
     },
     render::PreparedRain,
 };
@@ -37,7 +38,8 @@ fn along_a_beam_light_falls_with_the_square_of_the_distance() {
     let scattering = ScatteringTable::new(&DropPhaseFunction::new());
     let spot = Emitter::Spot { position: DVec3::ZERO, axis: DVec3::X, cos_inner: 0.95, cos_outer: 0.9 };
     let lights = [Light { emitter: spot, intensity: [1000.0; 3] }];
-    let lighting = DropLighting { scattering: &scattering, lights: &lights, extinction: 0.0 };
+    let shadows = LampShadows::default();
+    let lighting = DropLighting { scattering: &scattering, lights: &lights, shadows: &shadows, extinction: 0.0 };
     // Seen from the side, so that every drop turns the light by the same angle.
     let samples: Vec<[f64; 2]> = (1..40)
         .map(|i| {
@@ -162,7 +164,8 @@ fn the_airlight_is_single_scattering_along_each_line_of_sight() {
     let view = view_at(1.0, 1.0 / 60.0, SIZE);
     let rain = rain(parameters, 1);
     let beta = rain.extinction(1.0).all;
-    let lighting = DropLighting { scattering: &rain.optics.scattering, lights: &[light], extinction: beta };
+    let (scattering, shadows) = (&rain.optics.scattering, LampShadows::default());
+    let lighting = DropLighting { scattering, lights: &[light], shadows: &shadows, extinction: beta };
     for (x, y) in [(80, 20), (40, 32), (100, 40), (128, 16), (92, 33)] {
         let line = view.camera.direction(math::DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap().normalize();
         let end = rain.near_reach();

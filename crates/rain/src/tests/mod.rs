@@ -7,6 +7,7 @@ mod lens;
 mod light;
 mod motion;
 pub(crate) mod reference;
+mod shadows;
 
 use bansho_base::{
     camera::CameraParameters,
