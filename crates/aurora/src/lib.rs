@@ -46,6 +46,8 @@
 //! | section 2.3.4, table 3.3 | births and deaths of particles | `simulate::relocation::Relocation::relocate` |
 //! | section 2.4.2 | species by number density, line by production rate | [`mean_hard_sphere_photons`](physics::emission::excitation::mean_hard_sphere_photons) |
 //! | Fang et al. (1) to (5) | ionization by altitude and energy | [`MonoenergeticBeam::ionization`](physics::precipitation::fang2010::MonoenergeticBeam::ionization) |
+//! | Broadfoot (1967) | photons of 391.4 nm of an ion in sunlight | `physics::emission::resonant_scattering::scattered_photons_per_ion_pair` |
+//! | Bridson et al. (2007) | flow of the swirls: curl of noise | `simulate::sheets::swirls::Swirls::velocities` |
 //!
 //! # Data flow
 //!
@@ -72,9 +74,9 @@ pub mod simulate;
 
 pub use model::Aurora;
 pub use parameters::{
-    AuroraParameters, AuroraStage, FieldCharge, FieldParameters, FieldSolver, FoldParameters, NeighborSearch,
-    ParticleParameters, PowerDistribution, PulsationParameters, RayParameters, RelocationParameters, RepulsionForce,
-    RepulsionKernel, SpectrumShape,
+    AuroraParameters, AuroraStage, DiffuseParameters, FieldCharge, FieldParameters, FieldSolver, FoldParameters,
+    NeighborSearch, ParticleParameters, PowerDistribution, PulsationParameters, RayParameters, RelocationParameters,
+    RepulsionForce, RepulsionKernel, SpectrumShape, SwirlParameters,
 };
 pub use render::{Blur, BlurParameters, RenderingParameters, Sampling, TrackModel};
 pub use run::AuroraRun;

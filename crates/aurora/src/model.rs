@@ -91,7 +91,7 @@ impl Aurora {
         let neighbor_list_bytes = check_neighbors(&parameters, lengths.fold(f64::INFINITY, f64::min))?;
         let crossing = sequence.crossing();
         let factors: Vec<[f64; 2]> = sequence.factors().collect();
-        let emission = parameters.rendering.emission(parameters.spectrum);
+        let emission = parameters.rendering.emission(parameters.spectrum, parameters.sunlit_above_km);
         Ok(Self {
             name: name.to_owned(),
             seed,

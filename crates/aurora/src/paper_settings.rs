@@ -20,6 +20,8 @@ pub(crate) const PAPER: PaperSettings = PaperSettings {
         PaperSetting::new("particles.relocation.scale_counts", &["false"], "table 3.3"),
         PaperSetting::new("rays.contrast", &["0"], "section 2.3.2"),
         PaperSetting::new("folds.amplitude_km", &["0"], "section 2.2.1"),
+        PaperSetting::new("swirls.displacement_km", &["0"], "section 2.2.1"),
+        PaperSetting::new("diffuse.fraction", &["0"], "section 2.2.3"),
         PaperSetting::new("energy_ev", &["10000"], "section 2.4.1"),
         PaperSetting::new("spectrum", &["\"monoenergetic\""], "section 2.4.1"),
         PaperSetting::new("afterglow", &["false"], "section 2.4.2"),

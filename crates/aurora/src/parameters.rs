@@ -208,15 +208,19 @@ bansho_base::parameters! {
     /// Rays: bright and dark streaks along the sheet.
     pub struct RayParameters {
         /// Variation of the brightness along the sheet: the standard deviation of its logarithm.
-        contrast: f64 = 0.7, limits(Range::new(0.0, 3.0));
+        contrast: f64 = 0.6, limits(Range::new(0.0, 3.0));
         /// Distance between rays.
         spacing_km: f64 = 2.5, limits(Range::new(0.05, 1000.0)), unit("km");
+        /// Length of the largest variations along the sheet: rays come in bundles, and these in bright and quiet stretches.
+        outer_scale_km: f64 = 80.0, limits(Range::new(0.05, 10_000.0)), unit("km");
+        /// Amplitude of variations relative to those twice as long: 0.5 for bundles that outshine their rays, 1 for rays that are as strong as bundles.
+        octave_gain: f64 = 0.6, limits(Range::new(0.0, 1.0));
         /// Speed of the rays along the sheet, in opposite directions on its two sides.
         shear_km_per_s: f64 = 1.5, limits(Range::new(-100.0, 100.0)), unit("km/s");
-        /// Lifetime of a ray.
+        /// Lifetime of a group of four rays; that of longer variations is longer in proportion.
         lifetime_s: f64 = 3.0, limits(Range::new(0.01, 1e5)), unit("s");
         /// Variation of the electron energy with the rays: bright rays reach lower altitudes. The standard deviation of its logarithm.
-        energy_variation: f64 = 0.05, limits(Range::new(0.0, 2.0));
+        energy_variation: f64 = 0.15, limits(Range::new(0.0, 2.0));
         /// Depth of black rays, thin dark gaps that travel along the sheet.
         black_ray_depth: f64 = 0.0, limits(FRACTION);
         /// Distance between black rays.
@@ -237,6 +241,38 @@ bansho_base::parameters! {
         lifetime_s: f64 = 8.0, limits(Range::new(0.01, 1e5)), unit("s");
         /// Lean of the crests: 0 for waves, 1 for curls.
         curl: f64 = 0.3, limits(Range::new(0.0, 2.0));
+    }
+}
+
+bansho_base::parameters! {
+    /// A slow flow that winds the sheets as a whole, each with the others: bends, swirls and quiet stretches.
+    pub struct SwirlParameters {
+        /// Path along which the flow carries a point of a sheet (root mean square); 0 for none.
+        displacement_km: f64 = 30.0, limits(Range::new(0.0, 1000.0)), unit("km");
+        /// Size of the largest swirls.
+        size_km: f64 = 160.0, limits(Range::new(1.0, 10_000.0)), unit("km");
+        /// Speed with which the swirls drift eastward.
+        drift_km_per_s: f64 = 0.3, limits(Range::new(-100.0, 100.0)), unit("km/s");
+        /// Lifetime of a swirl.
+        lifetime_s: f64 = 60.0, limits(Range::new(0.01, 1e5)), unit("s");
+    }
+}
+
+bansho_base::parameters! {
+    /// The diffuse aurora: a weak glow without rays on both sides of the sheets.
+    pub struct DiffuseParameters {
+        /// Power of its electrons relative to those of the sheets, in addition to them.
+        fraction: f64 = 0.7, limits(Range::new(0.0, 100.0));
+        /// Width to each side of the sheets (standard deviation).
+        width_km: f64 = 35.0, limits(Range::new(1.0, 2000.0)), unit("km");
+        /// Energy of its electrons.
+        energy_ev: f64 = 3000.0, limits(Range::new(100.0, 100_000.0)), unit("eV");
+        /// Variation of its brightness in patches: the standard deviation of its logarithm.
+        contrast: f64 = 0.5, limits(Range::new(0.0, 2.0));
+        /// Size of the largest patches.
+        patch_km: f64 = 90.0, limits(Range::new(1.0, 10_000.0)), unit("km");
+        /// Lifetime of the largest patches.
+        lifetime_s: f64 = 30.0, limits(Range::new(0.01, 1e5)), unit("s");
     }
 }
 
@@ -278,7 +314,7 @@ bansho_base::parameters! {
     pub struct AuroraParameters {
         /// Side of the drawn square, which is centered on the observer's zenith.
         extent_km: f64 = 600.0, limits(Range::new(1.0, 20_000.0)), unit("km");
-        /// Energy flux of the electrons within a sheet: 10 for a faint arc, 50 for a bright one, 300 for a storm.
+        /// Energy flux of the electrons, mean over the thickness of a sheet: 10 for a faint arc, 50 for a bright one, 300 for a storm.
         flux_mw_per_m2: Animated<f64> = Animated::from(50.0), limits(Range::new(0.0, 10_000.0)), unit("mW/m^2");
         /// Energy of the electrons: 500 eV for a high, red aurora, 5000 eV for a green one, 30000 eV for one with a low, pink lower border. The
         /// product with the factor of a sheet must be within the range of the tables, 100 eV to 100 keV.
@@ -297,6 +333,9 @@ bansho_base::parameters! {
         time_lapse: f64 = 1.0, limits(Range::new(0.01, 1e4));
         /// Whether excited atoms emit over their lifetime, 0.75 s for green and up to 134 s for red light. If `false` they emit at once, as in the thesis.
         afterglow: bool = true;
+        /// Altitude above which the sun shines: N2+ ions scatter its light there, and rays have tall blue-violet tops. With the sun at a depression D
+        /// it is 6371 km (1 / cos D - 1): 98 km at 10 degrees, 225 km at 15, 409 km at 20. Without it the aurora is in the Earth's shadow.
+        sunlit_above_km: Option<f64> = None, limits(Range::new(80.0, 800.0)), unit("km");
         /// Simulated time before the shot.
         preroll_s: f64 = 1.5, limits(Range::new(0.0, 60.0)), unit("s");
         /// The shapes in chronological order; two waving curtains if the list is empty.
@@ -311,6 +350,10 @@ bansho_base::parameters! {
         rays: RayParameters = RayParameters::default();
         /// Folds that travel along a sheet.
         folds: FoldParameters = FoldParameters::default();
+        /// A slow flow that winds the sheets as a whole.
+        swirls: SwirlParameters = SwirlParameters::default();
+        /// The diffuse aurora beside the sheets.
+        diffuse: DiffuseParameters = DiffuseParameters::default();
         /// Patches that brighten and fade.
         pulsation: PulsationParameters = PulsationParameters::default();
         /// Rendering of the light.
@@ -373,14 +416,18 @@ impl TrackModel {
 }
 
 impl RenderingParameters {
-    /// The emission table for a spectrum.
-    pub(crate) fn emission(&self, shape: SpectrumShape) -> Arc<Emission> {
+    /// The emission table for a spectrum. With `sunlit_above_km`, N2+ scatters sunlight above that altitude.
+    pub(crate) fn emission(&self, shape: SpectrumShape, sunlit_above_km: Option<f64>) -> Arc<Emission> {
         let has_own_radii = self.energy_deposition == TrackModel::HardSphereAtmosphere
             && self.hard_spheres != HardSphereParameters::default();
-        if has_own_radii {
+        let emission = if has_own_radii {
             Arc::new(Emission::from_hard_spheres(atmosphere(), shape.spectrum(), &self.hard_spheres))
         } else {
             self.energy_deposition.shared_emission(shape)
+        };
+        match sunlit_above_km {
+            Some(altitude_km) => Arc::new(Emission::clone(&emission).sunlit_above(atmosphere(), altitude_km)),
+            None => emission,
         }
     }
 }
@@ -424,6 +471,9 @@ bansho_base::parameters! {
         hard_spheres: HardSphereParameters = HardSphereParameters::default();
         /// Color matching functions by which spectral lines become color. Table 2.1 has the five lines of `energy_deposition = "hard_sphere"` only.
         color_matching: ColorMatching = ColorMatching::Cie1931;
+        /// White balance of the camera of `color_matching = "camera"`, as the temperature of a black body; its colors are those of photographs if
+        /// `picture.white_balance_k` is the same.
+        camera_white_k: f64 = 4000.0, limits(Range::new(1500.0, 25_000.0)), unit("K");
         /// Where light is blurred: on the sky in km, or in the picture in pixels.
         blur_space: Blur = Blur::World;
         /// Radii of the blur in the picture.
@@ -465,6 +515,9 @@ pub(crate) fn check_sampling(parameters: &AuroraParameters) -> Result<(), ShapeE
     let RenderingParameters { sampling, energy_deposition, .. } = &parameters.rendering;
     if *sampling == Sampling::SinglePhotons && *energy_deposition != TrackModel::HardSphereAtmosphere {
         return Err(ShapeError { key: "rendering.sampling".to_owned(), kind: ShapeErrorKind::PhotonsWithoutSpheres });
+    }
+    if *sampling == Sampling::SinglePhotons && parameters.sunlit_above_km.is_some() {
+        return Err(ShapeError { key: "sunlit_above_km".to_owned(), kind: ShapeErrorKind::PhotonsInSunlight });
     }
     Ok(())
 }

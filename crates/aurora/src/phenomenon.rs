@@ -14,7 +14,7 @@ use super::{
     AuroraParameters, AuroraStage,
     model::{Aurora, OBLIQUE_LUMINANCE_FACTOR},
     parameters::Blur,
-    render::{aovs::AOVS, stages::WHITE_LUMINANCE},
+    render::{aovs::AOVS, emitted_light::SKY_LIGHTS, stages::WHITE_LUMINANCE},
     run::AuroraRun,
     shapes::ShapeErrorKind,
     simulate::AuroraSimulation,
@@ -36,11 +36,12 @@ impl AuroraParameters {
             "folds.amplitude_km",
         ],
         in_the_sky: true,
-        // View from the ground toward the northern sky of a clear night. With the airglow of a quiet night the sky is darker than the curtains.
+        // View from the ground toward the northern sky of a clear night, with the last of the twilight. With the airglow of a quiet night the sky is darker
+        // than the curtains.
         scene_defaults: "\
-        picture = { exposure_ev100 = -6.9, white_balance_k = 4000.0 }\n\
+        picture = { exposure_ev100 = -7.3, white_balance_k = 4000.0 }\n\
         camera = { position = [0.0, 1.7, 0.0], target = [0.0, 32.0, -57.0], vertical_fov_deg = 62.0 }\n\
-        sky = { kind = \"night\", hills_deg = 2.0, trees_deg = 1.1, night = { airglow = 0.3, stars = 0.6, milky_way = 0.5 } }\n",
+        sky = { kind = \"night\", hills_deg = 6.0, hills_form = \"mountains\", night = { sun_elevation_deg = -14.5, sun_azimuth_deg = 180.0, airglow = 0.3, stars = 0.6, milky_way = 0.5 } }\n",
         ..TableKind::phenomenon::<Self>("aurora")
     };
 }
@@ -65,7 +66,8 @@ impl Phenomenon for Aurora {
     fn info(&self) -> PhenomenonInfo<'_> {
         let preroll = self.parameters.preroll_s;
         let stepping = Stepping { step: AuroraSimulation::STEP_S, preroll, crossfade: self.crossfade_s };
-        PhenomenonInfo { aovs: AOVS, stepping: Some(stepping), ..PhenomenonInfo::new(&self.name) }
+        let sky_lights = if self.parameters.stage == AuroraStage::Light { SKY_LIGHTS } else { 0 };
+        PhenomenonInfo { aovs: AOVS, stepping: Some(stepping), sky_lights, ..PhenomenonInfo::new(&self.name) }
     }
 
     fn memory_bytes(&self, pixels: f64) -> f64 {

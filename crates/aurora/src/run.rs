@@ -18,7 +18,7 @@ use crate::{
     AuroraStage,
     model::Aurora,
     render::{
-        emitted_light::directional_light,
+        emitted_light::{EmittedLight, emitted_light},
         inputs::RenderInputs,
         integrate::column_buffer::ChartMemory,
         prepared::{DEPTHS, PreparedAurora},
@@ -72,11 +72,11 @@ impl Run for AuroraRun {
         if self.aurora.parameters.stage != AuroraStage::Light {
             return Publication::default();
         }
-        Publication {
-            lights: directional_light(self.simulation(), &self.aurora.render_tables().emitter_colors)
-                .into_iter()
-                .collect(),
-            ..Publication::default()
+        match emitted_light(self.simulation(), &self.aurora.render_tables().emitter_colors) {
+            Some(EmittedLight { mean, sky }) => {
+                Publication { lights: vec![mean], sky_lights: sky, ..Publication::default() }
+            }
+            None => Publication::default(),
         }
     }
 

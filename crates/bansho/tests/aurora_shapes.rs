@@ -156,7 +156,9 @@ fn no_particle_is_in_the_black_circle_and_the_inner_bends() {
             let shares = fractions_within(&simulation, &places);
             let (within, around) = shares.split_at(places.len() / 2);
             assert!(within.iter().flatten().all(|share| *share == 0.0), "scene {scene}, frame {frame}: {within:?}");
-            assert!(around.iter().flatten().all(|share| *share > 1e-2), "scene {scene}, frame {frame}: {around:?}");
+            // Rays make quiet stretches, so that the power there varies more than the number.
+            let are_around = around.iter().all(|[count, power]| *count > 1e-2 && *power > 2e-3);
+            assert!(are_around, "scene {scene}, frame {frame}: {around:?}");
         }
     }
 }

@@ -79,8 +79,8 @@ fn a_camera_that_is_told_where_to_stand_or_look_is_left_alone() {
 #[test]
 fn what_the_scene_places_is_exposed_for_itself() {
     let exposure = |text: &str| read(text).picture.exposure_ev100;
-    assert_eq!(exposure("[[aurora]]"), Auto::Set(-6.9));
-    assert_eq!(exposure("[[aurora]]\nflux_mw_per_m2 = 3"), Auto::Set(-6.9));
+    assert_eq!(exposure("[[aurora]]"), Auto::Set(-7.3));
+    assert_eq!(exposure("[[aurora]]\nflux_mw_per_m2 = 3"), Auto::Set(-7.3));
     for text in ["[[aurora]]\nshapes = [{ sheets = [{ form = \"fold\" }] }]", "[[aurora]]\n[[aurora]]\nextent_km = 200"]
     {
         assert_eq!((exposure(text), read(text).implied.as_slice()), (Auto::Auto, NIGHT), "{text}");

@@ -13,7 +13,7 @@ use bansho_base::{
     image::{Image, Rect},
     math::DVec3,
 };
-use support::{CAMERA, channel, draw, luminance, plan_with};
+use support::{CAMERA, Planned, channel, draw, luminance, plan_with};
 
 const SIZE: [usize; 2] = [120, 90];
 /// Focal length of [`CAMERA`], pixels.
@@ -222,6 +222,49 @@ fn the_exposure_of_the_picture_is_that_of_the_added_light() {
     assert!((ratio - 4.0).abs() < 1e-3, "{ratio}");
 }
 
+/// An arc of that flux, `south_km` to the south of the zenith.
+fn arc(south_km: f64, flux: f64) -> String {
+    format!(
+        "[[aurora]]\nflux_mw_per_m2 = {flux}\npreroll_s = 0\nparticles = {{ count = 2000 }}\n\
+         [[aurora.shapes]]\nsheets = [{{ points = [[-200, {south_km}], [200, {south_km}]] }}]\n"
+    )
+}
+
+#[test]
+fn an_aurora_lights_what_faces_its_part_of_the_sky() {
+    // A wall to the north, which faces the south.
+    let wall = plate(|_, _| 3.0);
+    let at_middle = |aurora: &str| {
+        let scene = bansho::parse_scene("aurora.toml", &format!("{CAMERA}{LIT}{aurora}")).unwrap();
+        let planned = Planned::new(scene, &PlanOptions::default(), Arc::new(wall.clone()));
+        luminance(&draw(&mut planned.open(), 0), 60, 45)
+    };
+    let behind_viewer = at_middle(&arc(150.0, 40.0));
+    assert!(behind_viewer > 0.0, "{behind_viewer}");
+    assert_close(at_middle(&arc(150.0, 80.0)), 2.0 * behind_viewer, 0.02, "twice the flux");
+    // Lights of the sky are up to 44 degrees from what they stand for.
+    let behind_wall = at_middle(&arc(-250.0, 40.0));
+    assert!(behind_wall < 0.1 * behind_viewer, "{behind_wall} of {behind_viewer}");
+}
+
+#[test]
+fn the_sky_of_the_scene_is_seen_where_a_plate_has_no_depth() {
+    let half = plate(|_, y| if y < 40 { f64::INFINITY } else { 3.0 });
+    let sky = "[sky]\nkind = \"overcast\"\nluminance = 2.0\n";
+    let draw_plate = |key: &str| {
+        let text = format!("{CAMERA}[plate]\nimage = \"plate\"\nexposure_ev100 = 0\n{key}{sky}");
+        draw(&mut plan_with(&text, &PlanOptions::default(), Arc::new(half.clone())).open(), 0)
+    };
+    let (kept, replaced) = (draw_plate(""), draw_plate("sky = \"scene\"\n"));
+    let alone = plan_with(&format!("{CAMERA}{sky}"), &PlanOptions::default(), Arc::new(MemoryAssets::default()));
+    let alone = draw(&mut alone.open(), 0);
+    for x in [3, 60, 117] {
+        assert_eq!(replaced.beauty.at(x, 20), alone.beauty.at(x, 20));
+        assert!(luminance(&alone, x, 20) > 0.1 && luminance(&kept, x, 20) == 0.0);
+        assert_eq!(replaced.beauty.at(x, 60), kept.beauty.at(x, 60));
+    }
+}
+
 #[test]
 fn what_cannot_be_lit_is_refused_where_it_is_stated() {
     let fault = |plate_text: &str, change: &dyn Fn(&mut MemoryAssets)| {
@@ -234,6 +277,8 @@ fn what_cannot_be_lit_is_refused_where_it_is_stated() {
     let unchanged = |_: &mut MemoryAssets| {};
     let told = fault("image = \"flat\"\nalbedo = \"albedo\"\n", &unchanged);
     assert!(told.contains("scene.toml:4:10: plate.albedo: `albedo` needs a depth"), "{told}");
+    let told = fault("image = \"flat\"\nsky = \"scene\"\n", &unchanged);
+    assert!(told.contains("scene.toml:4:7: plate.sky: `sky = \"scene\"` needs a depth"), "{told}");
     let told = fault("image = \"flat\"\nnormal = \"flat\"\n", &unchanged);
     assert!(told.contains("scene.toml:4:10: plate.normal: `normal` needs a depth"), "{told}");
     let told = fault("image = \"plate\"\nnormal = \"flat\"\n", &unchanged);

@@ -122,8 +122,10 @@ fn scene(seed: u64) -> String {
     for shared in tables::shared(KINDS).filter(|shared| !["plate", "fog"].contains(&shared.key)) {
         let mut table = sample((shared.table)(), &mut uniform);
         // Random tables name no files, so no obstacle can be a mesh; the size of the picture is fixed.
-        let left_out = [("obstacle", "shape"), ("picture", "size")];
-        table.entries.retain(|entry| !left_out.contains(&(shared.key, &entry.key)));
+        // The settings of a camera go together only, and not with an exposure.
+        let settings = ["f_number", "exposure_time_s", "iso"].map(|key| ("picture", key));
+        let left_out = [&settings[..], &[("obstacle", "shape"), ("picture", "size")]].concat();
+        table.entries.retain(|entry| !left_out.contains(&(shared.key, entry.key.as_str())));
         let camera = CameraParameters::read_table(&table, &mut Reader::new(), &[]);
         // Exposures of seconds are the mean of many parts: most scenes have a usual one.
         if shared.key == "camera" && !seed.is_multiple_of(16) {

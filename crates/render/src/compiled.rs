@@ -16,7 +16,7 @@ use crate::{
     fingerprint::{self, Fingerprint},
     plate_boxes::{PlateBoxes, PlateBoxesCache, PlateBoxesKey},
 };
-use bansho_scene::{Instance, Scene, SceneError, SharedInstance};
+use bansho_scene::{Instance, PlateSky, Scene, SceneError, SharedInstance};
 
 /// A scene whose phenomena and shared tables are built.
 #[derive(Clone)]
@@ -387,7 +387,8 @@ fn drawn_tables(
     for tables in visible.chunk_by(|a, b| a.instance.kind.key == b.instance.kind.key) {
         let kind = tables[0].instance.kind;
         let Some(SharedRole { draw: Some(draw), is_behind_plates, .. }) = kind.shared_role() else { continue };
-        if *is_behind_plates && scene.has_plate() && plate_image(scene, assets).is_none_or(is_opaque) {
+        let shows_sky = || scene.plate.sky == PlateSky::Scene || !plate_image(scene, assets).is_none_or(is_opaque);
+        if *is_behind_plates && scene.has_plate() && !shows_sky() {
             continue;
         }
         let fingerprints: Vec<Fingerprint> = tables.iter().map(|built| built.fingerprint).collect();

@@ -244,7 +244,8 @@ impl CrossfadeRun {
 
 /// What is published, scaled by the weight of its run.
 fn scaled(mut publication: Publication, weight: f32) -> Publication {
-    publication.lights.iter_mut().for_each(|light| light.intensity = light.intensity.map(|value| value * weight));
+    let lights = publication.lights.iter_mut().chain(&mut publication.sky_lights);
+    lights.for_each(|light| light.intensity = light.intensity.map(|value| value * weight));
     publication.extinction *= f64::from(weight);
     publication
 }

@@ -7,7 +7,7 @@ use bansho_base::{
     tables::TableKind,
 };
 
-use crate::{FORMAT, Scene, text::path::nearest_span};
+use crate::{FORMAT, PictureParameters, Scene, states_in, text::path::nearest_span};
 
 /// Checks the format number. Returns whether to read the rest: another format has other keys, each of which would be reported as a further
 /// problem.
@@ -165,6 +165,22 @@ fn field_of_view(scene: &Scene, root: &Table, reader: &mut Reader) {
     );
 }
 
+/// The exposure is stated by a value, or by all settings of a camera.
+pub(crate) fn exposure(root: &Table, reader: &mut Reader) {
+    let (stated, missing): (Vec<&str>, Vec<&str>) =
+        PictureParameters::CAMERA_SETTINGS.iter().partition(|key| states_in(root, "picture", key));
+    let Some(first) = stated.first() else { return };
+    let reason = if !missing.is_empty() {
+        format!("an exposure by the settings of a camera also needs `{}`", missing.join("` and `"))
+    } else if states_in(root, "picture", "exposure_ev100") {
+        "the exposure is also stated by `exposure_ev100`; allowed: one of them".to_owned()
+    } else {
+        return;
+    };
+    let error = BuildError { key: (*first).into(), kind: ProblemKind::Conflict(reason) };
+    report_build_error(error, "picture".into(), root, reader);
+}
+
 /// The depth, its known points, the surfaces and the exposure of a plate need its image.
 fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
     if scene.plate.image.is_none() && scene.plate.depth.is_some() {
@@ -196,6 +212,30 @@ fn plate(scene: &Scene, root: &Table, reader: &mut Reader) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kinds;
+
+    #[test]
+    fn an_exposure_is_a_value_or_all_settings_of_a_camera() {
+        let parse = |picture: &str| {
+            Scene::parse("night.toml", &format!("bansho = 2\n[picture]\n{picture}\n"), &[kinds::PICTURE])
+        };
+        let scene = parse("f_number = 2.0\nexposure_time_s = 4.0\niso = 1600").unwrap();
+        // log2(4 / 4) - log2(16).
+        assert_eq!(scene.picture.exposure_ev100, Auto::Set(-4.0));
+        for (picture, expected) in [
+            ("iso = 400", "also needs `f_number` and `exposure_time_s`"),
+            (
+                "f_number = 2.0\nexposure_time_s = 4.0\niso = 1600\nexposure_ev100 = -4.0",
+                "also stated by `exposure_ev100`",
+            ),
+            ("f_number = 0.0\nexposure_time_s = 4.0\niso = 1600", "0.1"),
+            ("f_number = 2.0\nexposure_time_s = 4.0\niso = 0", "1"),
+        ] {
+            let error = parse(picture).err().expect(picture);
+            assert_eq!(error.problems.len(), 1, "{error}");
+            assert!(error.to_string().contains(expected) && error.to_string().contains("night.toml:"), "{error}");
+        }
+    }
 
     #[test]
     fn a_scene_of_another_format_is_one_error() {

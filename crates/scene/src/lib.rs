@@ -18,7 +18,7 @@ use bansho_base::{
     camera::{CameraParameters, SKY_FOV_DEG},
     host::memory,
     parameters::{
-        self, Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, Value, animated::Animated,
+        self, Auto, Parameter, Parameters, Problem, ProblemKind, Problems, Reader, Table, Value, animated::Animated,
     },
     tables::{PhenomenonTable, ReadPhenomenon, TableKind, TableRole, find, phenomena},
     world::{air::Air, wind::WindParameters},
@@ -33,7 +33,7 @@ pub use self::{
         depth::{DepthDoubt, DepthFit, DepthScale, DepthValues},
         ground_fit::{GroundFit, PlateView},
         kinds::{self, GLARE_LAYER, PLATE_LAYER},
-        picture::{self, DepthKind, FrameRate, PictureParameters, PlateAlpha, PlateParameters},
+        picture::{self, DepthKind, FrameRate, PictureParameters, PlateAlpha, PlateParameters, PlateSky},
         plate::{PlateDepth, PlatePictures},
         plate_checks::PlateRemark,
         plate_surfaces::PlateSurfaces,
@@ -298,12 +298,21 @@ impl Scene {
     fn read(root: &Table, kinds: &[TableKind], reader: &mut Reader) -> Self {
         check::root_keys(root, kinds, reader);
         let (completed, implied) = defaults::with_defaults(root, kinds);
-        Self::read_completed(&completed, kinds, implied, reader).with_camera_toward_sky(&completed)
+        let scene = Self::read_completed(&completed, kinds, implied, reader).with_camera_toward_sky(&completed);
+        // Of values that are wrong in themselves it is not asked whether they go together.
+        if reader.is_clean() {
+            check::exposure(root, reader);
+        }
+        scene
     }
 
     /// Reads a scene from a `root` that includes the defaults of [`defaults::with_defaults`].
     fn read_completed(root: &Table, kinds: &[TableKind], implied: Vec<&'static str>, reader: &mut Reader) -> Self {
-        let picture: PictureParameters = read_field(root, "picture", reader);
+        let mut picture: PictureParameters = read_field(root, "picture", reader);
+        // Settings of a camera come before the default exposure of the scene's phenomena.
+        if let Some(ev100) = picture.ev100_of_camera() {
+            picture.exposure_ev100 = Auto::Set(ev100);
+        }
         reader.set_frame_rate(picture.fps.frames, picture.fps.seconds);
         let mut scene = Self {
             kinds: kinds.into(),

@@ -141,10 +141,23 @@ await mustNotFreeze(flame, "playing", 3, async (tried) => {
 });
 await flame.close();
 
-// A stroke makes an aurora. The editor's squares lie below the picture.
+// A stroke makes an aurora. The editor's squares lie below the picture. Few kilorayleighs: a sky that is bright already hides a stroke.
 const sky = await open("quiet_arc");
 const above = { x: 370, y: 60, width: 530, height: 220 };
-const alone = await until(sky, above, isDrawn, "no aurora", 120);
+const bright = await until(sky, above, isDrawn, "no aurora", 120);
+const faint = `bansho = 2
+[camera]
+target = [0.0, 28.0, -60.0]
+vertical_fov_deg = 54.0
+[picture]
+exposure_ev100 = -5.0
+[[aurora]]
+flux_mw_per_m2 = 20.0
+[[aurora.shapes]]
+sheets = [{ form = "arc", length_km = 200.0, position_km = [0.0, -190.0] }]
+`;
+await (await chooserOf(sky)).setFiles({ name: "faint.toml", mimeType: "text/plain", buffer: Buffer.from(faint) });
+const alone = await until(sky, above, (seen) => isDrawn(seen) && seen.mean < 0.5 * bright.mean, "no faint aurora", 120);
 const square = { x: 584, y: 417, side: 365 };
 const at = (x, y) => [square.x + x * square.side, square.y + y * square.side];
 await mustNotFreeze(sky, "drawing", 6, (tried) => {

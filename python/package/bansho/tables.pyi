@@ -43,6 +43,15 @@ class Picture(SceneTable):
     exposure_ev100:
         Exposure value at ISO 100, or "auto": that of the plate; without a plate, measured once for the shot from the
         luminance of the scene. [EV] Allowed: "auto" or a number from -40 to 40. Default: 'auto'.
+    f_number:
+        F-number of the camera. With `exposure_time_s` and `iso` it states the exposure in place of `exposure_ev100`:
+        log2(100 f_number^2 / (exposure_time_s iso))  (ISO 2720). Depth of field is not drawn. Allowed: a number from
+        0.1 to 1000.
+    exposure_time_s:
+        Exposure time that, with `f_number` and `iso`, states the exposure. Motion is blurred over `shutter_s` of
+        `[camera]`. [s] Allowed: a number from 0.0000001 to 1000000.
+    iso:
+        Sensitivity of the camera (ISO), with `f_number` and `exposure_time_s`. Allowed: a number from 1 to 10000000.
     view:
         View transform of display formats, where the program's user chooses none. A plate that is made for display goes
         through its inverse, so that its  pixels return unchanged. Allowed: one of "display", "neutral", "agx",
@@ -72,6 +81,9 @@ class Picture(SceneTable):
         first_frame: int | None = ...,
         fps: float | str | None = ...,
         exposure_ev100: float | Literal["auto"] | None = ...,
+        f_number: float | None = ...,
+        exposure_time_s: float | None = ...,
+        iso: float | None = ...,
         view: Literal["display", "neutral", "agx", "standard", "raw"] | None = ...,
         white_balance_k: float | None = ...,
         seed: int | None = ...,
@@ -185,6 +197,10 @@ class Plate(SceneTable):
         Points whose distance along the camera's axis is known, as [x, y, meters], in pixels of the image from its upper
         left corner. From two or more of them,  scale and shift of an inverse depth are found by least squares. Allowed:
         a list of 0 to 1000 items, each a list of 3 numbers from 0 to 1000000. Default: [].
+    sky:
+        What is seen where the depth is infinite (or 0): the image's own sky, or the sky of the scene in its place. The
+        plate needs a depth. Allowed: one of "plate", "scene". Default: 'plate'. `plate`:  The image, as it is. `scene`:
+        The sky of the scene.
     albedo:
         Diffuse color of what the image shows: an EXR of linear values, or PNG, JPEG, WebP or TIFF in sRGB, from 0 to 1.
         With it, the fires and lamps that are drawn  light what the plate shows. The plate needs a depth. Allowed: a
@@ -211,6 +227,7 @@ class Plate(SceneTable):
         depth_scale: float | None = ...,
         depth_shift: float | None = ...,
         depth_known: Sequence[Vector3] | None = ...,
+        sky: Literal["plate", "scene"] | None = ...,
         albedo: str | None = ...,
         normal: str | None = ...,
         exposure_ev100: float | Literal["auto"] | None = ...,
@@ -278,13 +295,19 @@ class Sky(SceneTable):
     hills_deg:
         Elevation of the hills all around, in front of the sky; 0 for none. [degrees] Allowed: a number from 0 to 30.
         Default: 0.0.
+    hills_form:
+        Form of the hills. Allowed: one of "rounded", "mountains". Default: 'rounded'. `rounded`:  One range of low,
+        rounded hills. `mountains`:  Three ranges of mountains with sharp peaks, one behind another; by night the far
+        ones are lighter, from the air before them.
     trees_deg:
         Height of the trees on them; 0 for none. [degrees] Allowed: a number from 0 to 30. Default: 0.0.
     hills_distance:
-        Distance of the hills and trees. [m] Allowed: a number from 1 to 100000. Default: 8000.0.
+        Distance of the hills and trees, and of the nearest range of mountains; the others are at 2.4 and 5 times that.
+        [m] Allowed: a number from 1 to 100000. Default: 8000.0.
     night:
         The sky at night. Allowed: a table. Default: {'sun_elevation_deg': -30.0, 'sun_azimuth_deg': 0.0, 'airglow':
-        1.0, 'stars': 1.0, 'milky_way': 1.0, 'extinction': 0.22}.
+        1.0, 'stars': 1.0, 'milky_way': 1.0, 'extinction': 0.22, 'town': {'population': 0.0, 'azimuth_deg': 0.0,
+        'distance_km': 20.0, 'temperature_k': 2700.0}}.
     """
 
     def __init__(
@@ -295,6 +318,7 @@ class Sky(SceneTable):
         temperature_k: float | None = ...,
         visible: bool | None = ...,
         hills_deg: float | None = ...,
+        hills_form: Literal["rounded", "mountains"] | None = ...,
         trees_deg: float | None = ...,
         hills_distance: float | None = ...,
         night: Mapping[str, Any] | None = ...,
@@ -827,8 +851,8 @@ class Aurora(SceneTable):
         Side of the drawn square, which is centered on the observer's zenith. [km] Allowed: a number from 1 to 20000.
         Default: 600.0.
     flux_mw_per_m2:
-        Energy flux of the electrons within a sheet: 10 for a faint arc, 50 for a bright one, 300 for a storm. [mW/m^2]
-        Allowed: a number from 0 to 10000, or { keys = [[seconds, value], ...] }. Default: 50.0.
+        Energy flux of the electrons, mean over the thickness of a sheet: 10 for a faint arc, 50 for a bright one, 300
+        for a storm. [mW/m^2] Allowed: a number from 0 to 10000, or { keys = [[seconds, value], ...] }. Default: 50.0.
     energy_ev:
         Energy of the electrons: 500 eV for a high, red aurora, 5000 eV for a green one, 30000 eV for one with a low,
         pink lower border. The  product with the factor of a sheet must be within the range of the tables, 100 eV to 100
@@ -851,6 +875,10 @@ class Aurora(SceneTable):
         Seconds of the aurora per second of the picture; the afterglow fades faster by this factor. At 1 the green light
         of a sheet that crosses  the sky in seconds stays behind, and its front is purple. Most films of auroras are
         time lapses, in which the front is green. Allowed: a number from 0.01 to 10000. Default: 1.0.
+    sunlit_above_km:
+        Altitude above which the sun shines: N2+ ions scatter its light there, and rays have tall blue-violet tops. With
+        the sun at a depression D  it is 6371 km (1 / cos D - 1): 98 km at 10 degrees, 225 km at 15, 409 km at 20.
+        Without it the aurora is in the Earth's shadow. [km] Allowed: a number from 80 to 800.
     preroll_s:
         Simulated time before the shot. [s] Allowed: a number from 0 to 60. Default: 1.5.
     shapes:
@@ -869,21 +897,27 @@ class Aurora(SceneTable):
         'relocation': {'enabled': True, 'scatter_count_threshold': 0.1, 'potential_threshold': 0.25, 'births_below':
         50.0, 'max_births': 10.0, 'deaths_above': 500.0, 'max_deaths': 100.0, 'scale_counts': True}}.
     rays:
-        Rays: fine bright and dark streaks along a sheet. Allowed: a table. Default: {'contrast': 0.7, 'spacing_km':
-        2.5, 'shear_km_per_s': 1.5, 'lifetime_s': 3.0, 'energy_variation': 0.05, 'black_ray_depth': 0.0,
-        'black_ray_spacing_km': 8.0}.
+        Rays: fine bright and dark streaks along a sheet. Allowed: a table. Default: {'contrast': 0.6, 'spacing_km':
+        2.5, 'outer_scale_km': 80.0, 'octave_gain': 0.6, 'shear_km_per_s': 1.5, 'lifetime_s': 3.0, 'energy_variation':
+        0.15, 'black_ray_depth': 0.0, 'black_ray_spacing_km': 8.0}.
     folds:
         Folds that travel along a sheet. Allowed: a table. Default: {'amplitude_km': 3.0, 'wavelength_km': 40.0,
         'speed_km_per_s': 2.0, 'lifetime_s': 8.0, 'curl': 0.3}.
+    swirls:
+        A slow flow that winds the sheets as a whole. Allowed: a table. Default: {'displacement_km': 30.0, 'size_km':
+        160.0, 'drift_km_per_s': 0.3, 'lifetime_s': 60.0}.
+    diffuse:
+        The diffuse aurora beside the sheets. Allowed: a table. Default: {'fraction': 0.7, 'width_km': 35.0,
+        'energy_ev': 3000.0, 'contrast': 0.5, 'patch_km': 90.0, 'lifetime_s': 30.0}.
     pulsation:
         Patches that brighten and fade. Allowed: a table. Default: {'modulation_depth': 0.0, 'period_s': 8.0,
         'patch_length_km': 60.0}.
     rendering:
         Rendering of the light. Allowed: a table. Default: {'sampling': 'mean_profile', 'energy_deposition':
         'fang_2010', 'hard_spheres': {'collision_radius_pm': 32.0, 'quenching_radius_pm': 'auto'}, 'color_matching':
-        'cie_1931', 'blur_space': 'world', 'blur_radii': {'green_px': 1.5, 'red_px': 4.0, 'violet_px': 1.0,
-        'deep_red_px': 1.0}, 'blur_radius_km': 'auto', 'collision_deflection': 0.002, 'extinction': {'rayleigh': 0.106,
-        'aerosol': 0.09, 'angstrom_exponent': 1.3, 'ozone': 0.04}, 'attenuation_per_km': 0.0}.
+        'cie_1931', 'camera_white_k': 4000.0, 'blur_space': 'world', 'blur_radii': {'green_px': 1.5, 'red_px': 4.0,
+        'violet_px': 1.0, 'deep_red_px': 1.0}, 'blur_radius_km': 'auto', 'collision_deflection': 0.002, 'extinction':
+        {'rayleigh': 0.106, 'aerosol': 0.09, 'angstrom_exponent': 1.3, 'ozone': 0.04}, 'attenuation_per_km': 0.0}.
     afterglow:
         Whether excited atoms emit over their lifetime, 0.75 s for green and up to 134 s for red light. If `false` they
         emit at once, as in the thesis. Allowed: true or false. Default: True.
@@ -914,12 +948,15 @@ class Aurora(SceneTable):
         dip_deg: float | None = ...,
         declination_deg: float | None = ...,
         time_lapse: float | None = ...,
+        sunlit_above_km: float | None = ...,
         preroll_s: float | None = ...,
         shapes: Sequence[Mapping[str, Any]] | None = ...,
         field: Mapping[str, Any] | None = ...,
         particles: Mapping[str, Any] | None = ...,
         rays: Mapping[str, Any] | None = ...,
         folds: Mapping[str, Any] | None = ...,
+        swirls: Mapping[str, Any] | None = ...,
+        diffuse: Mapping[str, Any] | None = ...,
         pulsation: Mapping[str, Any] | None = ...,
         rendering: Mapping[str, Any] | None = ...,
         afterglow: bool | None = ...,

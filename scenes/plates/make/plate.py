@@ -18,6 +18,8 @@ from shaders import Shader
 
 SIZE = (1280, 720)
 NORMALS_SIZE = (640, 360)
+# The most bytes of a plate's files.
+LIMITS = {"picture": 300_000, "depth": 400_000, "albedo": 220_000, "normals": 390_000}
 
 
 def blender(point):
@@ -49,8 +51,8 @@ def empty_scene():
     return bpy.context.scene
 
 
-def camera(position, target, vertical_fov_deg):
-    """The camera, in Bansho's terms."""
+def camera(position, target, vertical_fov_deg, far=2000.0):
+    """The camera, in Bansho's terms. What lies `far` meters away is not drawn."""
     data = bpy.data.cameras.new("camera")
     item = bpy.data.objects.new("camera", data)
     scene = bpy.context.scene
@@ -62,14 +64,15 @@ def camera(position, target, vertical_fov_deg):
     data.sensor_fit = "VERTICAL"
     data.sensor_height = 24.0
     data.lens = 12.0 / np.tan(np.radians(vertical_fov_deg) / 2)
-    data.clip_start, data.clip_end = 0.05, 2000.0
+    data.clip_start, data.clip_end = 0.05, far
     return item
 
 
-def gradient_sky(stops, strength, clouds=0.0, cloud_color=(1.0, 1.0, 1.0), glow=None):
+def gradient_sky(stops, strength, clouds=0.0, cloud_color=(1.0, 1.0, 1.0), glow=None, seen=1.0):
     """A sky from the horizon (0) to overhead (1): `stops` are (sine of elevation, color).
 
     `clouds` is the contrast of layers of cloud, `glow` a (direction, color, exponent) around a set sun.
+    The camera and reflections see the share `seen` of its light.
     """
     world = bpy.data.worlds.new("sky")
     bpy.context.scene.world = world
@@ -90,9 +93,19 @@ def gradient_sky(stops, strength, clouds=0.0, cloud_color=(1.0, 1.0, 1.0), glow=
         plane = s.combine(s.math("DIVIDE", s.axis(direction, "X"), height), s.math("DIVIDE", s.axis(direction, "Y"), height), 0.0)
         cover = s.remap(s.noise(0.9, 9.0, 0.56, plane, 0.4), 0.34, 0.68)
         color = s.mix(s.math("MULTIPLY", cover, clouds), color, cloud_color)
+    if seen != 1.0:
+        path = s.node("ShaderNodeLightPath").outputs
+        direct = s.math("MAXIMUM", path["Is Camera Ray"], path["Is Glossy Ray"])
+        strength = s.remap(direct, 0.0, 1.0, strength, strength * seen)
     background = s.node("ShaderNodeBackground", {"Color": color, "Strength": strength})
     output = s.node("ShaderNodeOutputWorld")
     s.tree.links.new(background.outputs[0], output.inputs["Surface"])
+
+
+def night_sky():
+    """The faint glow of a night without moon and aurora, brighter toward the horizon."""
+    light = (0.30, 0.40, 0.58)
+    gradient_sky([(0.0, tuple(1.5 * c for c in light)), (0.25, tuple(1.2 * c for c in light)), (1.0, light)], 1.0, seen=0.12)
 
 
 def area_light(position, size, color, watts, direction=(0, 0, -1), spread_deg=180.0):
@@ -200,7 +213,7 @@ def center_depth(scene):
     depth = find(passes(scene), "depth")[..., 0]
     cycles.samples, cycles.pixel_filter_type, cycles.filter_width, cycles.use_denoising = saved
     cycles.use_adaptive_sampling, cycles.max_bounces = adaptive, bounces
-    return np.where(depth < 1500.0, depth, 0.0).astype(np.float32)
+    return np.where(depth < 0.75 * scene.camera.data.clip_end, depth, 0.0).astype(np.float32)
 
 
 # What a lens and air do
@@ -215,6 +228,27 @@ def blurred(image, sigma):
     kernel = np.exp(-2 * np.pi**2 * sigma**2 * (fx**2 + fy**2))
     out = np.fft.irfft2(np.fft.rfft2(wide, axes=(0, 1)) * kernel[..., None], s=wide.shape[:2], axes=(0, 1))
     return out[pad:pad + image.shape[0], pad:pad + image.shape[1]]
+
+
+def with_points(image, points, item):
+    """Lamps too small to be seen as more than points: (position in Blender's axes, color, watts), as `point_light` has them.
+
+    They are added as a lens images them, over about a pixel, and hidden by nothing.
+    """
+    height, width = image.shape[:2]
+    to_camera = np.array(item.matrix_world.inverted())
+    focal = height / 2 / (12.0 / item.data.lens)
+    image = image.copy()
+    for position, color, watts in points:
+        x, y, z, _ = to_camera @ np.array([*position, 1.0])
+        u, v = width / 2 - focal * x / z - 0.5, height / 2 + focal * y / z - 0.5
+        left, top = int(u) - 2, int(v) - 2
+        if z > 0 or not (0 <= left < width - 6 and 0 <= top < height - 6):
+            continue
+        spot = np.exp(-0.5 * ((np.arange(left, left + 6) - u) ** 2 + (np.arange(top, top + 6)[:, None] - v) ** 2) / 0.6**2)
+        radiance = watts / (4 * np.pi) / (x * x + y * y + z * z) * focal**2
+        image[top:top + 6, left:left + 6] += (radiance * spot / spot.sum())[..., None] * np.asarray(color)
+    return image
 
 
 def haze(image, depth, distance, color):
@@ -286,7 +320,8 @@ def rounded(values, bits):
 def save_depth(depth, path, limit):
     """With as many bits of mantissa as fit into `limit` bytes; half floats, which have 10, compress better where those suffice.
 
-    For foliage not even 8 bits fit: its depths are rounded to equal steps of 1 / depth, which are finer near the camera.
+    For foliage not even 8 bits fit: its depths are rounded to equal steps of 1 / depth, which are finer near the camera,
+    and to 5 bits where these are finer.
     """
     def fits(values, compression):
         header = {"compression": compression, "type": OpenEXR.scanlineimage}
@@ -301,16 +336,27 @@ def save_depth(depth, path, limit):
             return
     for steps in (2048, 1448, 1024, 860, 724, 608, 512):
         inverse = np.round(steps / np.maximum(depth, 0.1)) / steps
-        values = np.where((depth > 0) & (inverse > 0), 1 / np.maximum(inverse, 1e-6), 0).astype(np.float16)
+        values = np.where(depth < steps / 32, 1 / np.maximum(inverse, 1e-6), rounded(depth, 5))
+        values = np.where(depth > 0, values, 0).astype(np.float16)
         if fits(values, OpenEXR.PIZ_COMPRESSION):
             print(f"{path}: steps of 1/{steps} in 1 / depth")
             return
     raise ValueError(f"{path}: does not fit into {limit} bytes")
 
 
+def neighbor_changes(values):
+    """For each pixel, the second smallest of its differences to four neighbors: small on surfaces and at their edges, large in foliage."""
+    wide = np.pad(values, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    middle = wide[1:-1, 1:-1]
+    sides = (wide[:-2, 1:-1], wide[2:, 1:-1], wide[1:-1, :-2], wide[1:-1, 2:])
+    return np.sort(np.stack([np.linalg.norm(side - middle, axis=-1) for side in sides]), axis=0)[1]
+
+
 def save_normals(normals, path, limit):
-    """Half floats, rounded to the finest step that fits."""
-    for steps in (128, 64, 32, 16, 8):
+    """Half floats in steps of 1/128 where neighbors agree, and in coarser ones where they differ: as fine as fits."""
+    changes = neighbor_changes(normals)
+    for share in (0.08, 0.11, 0.16, 0.22, 0.32, 0.45, 0.64, 0.9, 1.3):
+        steps = 2.0 ** np.clip(np.floor(-np.log2(np.maximum(share * changes, 1e-6))), 2, 7)[..., None]
         value = (np.round(normals * steps) / steps).astype(np.float16)
         for compression in (OpenEXR.ZIP_COMPRESSION, OpenEXR.PIZ_COMPRESSION):
             header = {"compression": compression, "type": OpenEXR.scanlineimage}
@@ -318,7 +364,7 @@ def save_normals(normals, path, limit):
             with OpenEXR.File(header, channels) as file:
                 file.write(path)
             if os.path.getsize(path) <= limit:
-                print(f"{path}: steps of 1/{steps}")
+                print(f"{path}: steps up to {share} of the change between neighbors")
                 return
     raise ValueError(f"{path}: does not fit into {limit} bytes")
 
@@ -335,11 +381,18 @@ def camera_normals(world_normals, item):
     return np.where(length > 0.2, n / np.maximum(length, 1e-6), 0.0)
 
 
-def make(world, args, exposure, view_camera, look="AgX - High Contrast", air=None, halo=0.06):
-    """Renders the scene and writes the plate's files: picture, depth, albedo and normals."""
+def make(world, args, exposure, view_camera, look="AgX - High Contrast", air=None, halo=0.06, occlusion=0.0, metals=True, points=(), **limits):
+    """Renders the scene and writes the plate's files: picture, depth, albedo and normals.
+
+    With an `occlusion`, the albedo is multiplied by the share of the sky that is not hidden by what is nearer than this, in meters. Without `metals`, black surfaces stay black in it.
+    `points` are lamps that are seen as points. `limits` replace some of LIMITS.
+    """
     scene = bpy.context.scene
     bpy.context.view_layer.update()
     settings(scene, args, args.samples)
+    if occlusion:
+        scene.view_layers[0].use_pass_ambient_occlusion = True
+        scene.world.light_settings.distance = occlusion
     if args.passes and os.path.exists(args.passes):
         rendered = dict(np.load(args.passes))
     else:
@@ -347,25 +400,31 @@ def make(world, args, exposure, view_camera, look="AgX - High Contrast", air=Non
         rendered = {**passes(scene), "center": depth}
         if args.passes:
             np.savez(args.passes, **rendered)
-    save(world, args, rendered, exposure, view_camera, look, air, halo)
+    save(world, args, rendered, exposure, view_camera, look, air, halo, metals, points, {**LIMITS, **limits})
 
 
-def save(world, args, rendered, exposure, view_camera, look, air, halo):
+def save(world, args, rendered, exposure, view_camera, look, air, halo, metals, points, limits):
     """Develops the picture from the rendered passes, and writes the files."""
     linear = find(rendered, "combined")[..., :3]
     depth = rendered["center"]
     if air is not None:
         linear = haze(linear, depth, *air)
+    linear = with_points(linear, points, view_camera)
     picture = developed(veil(linear, halo), exposure, look)
     if args.crop or args.scale != 1.0 or args.lamps:
         name = "_lamps" if args.lamps else ""
         picture.save(os.path.join(args.into, f"{world}{name}.png"))
         return
     path = os.path.join(args.into, world)
-    save_jpeg(picture, path + ".jpg", 300_000)
-    save_depth(depth, path + "_depth.exr", 400_000)
+    save_jpeg(picture, path + ".jpg", limits["picture"])
+    save_depth(depth, path + "_depth.exr", limits["depth"])
     albedo = find(rendered, "diffuse", "color")[..., :3]
-    metal = albedo.max(axis=-1, keepdims=True) < 0.01
-    albedo = albedo + 0.5 * find(rendered, "glossy", "color")[..., :3] * metal
-    save_jpeg(Image.fromarray(encoded(albedo)), path + "_albedo.jpg", 220_000)
-    save_normals(camera_normals(find(rendered, "normal"), view_camera), path + "_normals.exr", 700_000)
+    if metals:
+        metal = albedo.max(axis=-1, keepdims=True) < 0.01
+        albedo = albedo + 0.5 * find(rendered, "glossy", "color")[..., :3] * metal
+    if any("occlusion" in name.lower() for name in rendered):
+        # Light that bright surfaces return to each other fills their hollows.
+        free = np.clip(find(rendered, "occlusion")[..., :1], 0, 1)
+        albedo = albedo * free / (1 - albedo * (1 - free))
+    save_jpeg(Image.fromarray(encoded(albedo)), path + "_albedo.jpg", limits["albedo"])
+    save_normals(camera_normals(find(rendered, "normal"), view_camera), path + "_normals.exr", limits["normals"])

@@ -9,6 +9,7 @@ use crate::{
     physics::{emission::Emission, extinction::AttenuationByDistance, precipitation::energy_grid::HIGHEST_EV},
     render::{
         bin::{EmissionInputs, nearest_node},
+        diffuse::DiffuseAurora,
         integrate::{column_buffer::ChartMemory, emission_profile::EmissionProfiles},
         project::field_lines::FieldLines,
         shade::EmitterColors,
@@ -29,6 +30,8 @@ pub(crate) struct RenderTables {
     pub(crate) red_profiles: EmissionProfiles,
     /// Colors of the emitters for an observer on the ground.
     pub(crate) emitter_colors: Arc<EmitterColors>,
+    /// The generator of the diffuse aurora.
+    pub(crate) diffuse: DiffuseAurora,
     /// The renderer of single collisions, if the scene selects them.
     pub(crate) collisions: Option<CollisionRenderer>,
 }
@@ -45,6 +48,7 @@ impl RenderTables {
         });
         Self {
             collisions,
+            diffuse: DiffuseAurora::new(&parameters.diffuse, parameters.extent_km, key),
             profiles: EmissionProfiles::new(emission, &attenuation),
             red_profiles: EmissionProfiles::red_by_altitude(emission, &attenuation),
             emitter_colors: Arc::new(EmitterColors::new(rendering, emission.lines())),
@@ -81,12 +85,18 @@ impl RenderInputs<'_> {
 }
 
 /// Inputs of the light sources of a state at time `t`, s.
-pub(crate) fn emission_inputs(simulation: &AuroraSimulation, t: f64) -> EmissionInputs<'_> {
+pub(crate) fn emission_inputs<'a>(
+    simulation: &'a AuroraSimulation,
+    diffuse: &'a DiffuseAurora,
+    t: f64,
+) -> EmissionInputs<'a> {
     let (parameters, emission) = (simulation.parameters(), simulation.emission());
     let energy_ev = parameters.energy_ev.at(t);
     EmissionInputs {
         particles: simulation.particles(),
         afterglow: parameters.afterglow.then(|| simulation.afterglow()),
+        diffuse,
+        time: t,
         emission,
         parameters: &parameters.rendering,
         spacing_km: simulation.spacing_km(),

@@ -8,6 +8,8 @@
 
 pub(crate) mod aovs;
 pub(crate) mod bin;
+pub(crate) mod cloud_in_cell;
+pub(crate) mod diffuse;
 pub(crate) mod emitted_light;
 pub(crate) mod inputs;
 pub(crate) mod integrate;

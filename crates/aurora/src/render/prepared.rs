@@ -81,7 +81,7 @@ enum DisplayedLight {
 impl<'a> PreparedAurora<'a> {
     pub(crate) fn new(inputs: RenderInputs<'a>, view: &'a View, observer: &dyn Observer) -> Result<Self, Cancelled> {
         let field = inputs.field_lines(view.camera.position);
-        let sources = shutter::sources(inputs.simulation, view, &field);
+        let sources = shutter::sources(inputs, view, &field);
         check(observer)?;
         let charts = ChartBuilder { inputs, field: &field, coverage: Coverage::of_view(view, &field) };
         let (sharp, soft) = parallel::join(|| charts.sharp(&sources), || charts.soft(&sources));
@@ -149,7 +149,7 @@ impl ChartBuilder<'_> {
         collisions.draw(buffer, self.field, &sorted_sources, step)
     }
 
-    /// The coarser chart of the red afterglow.
+    /// The coarser chart of the red afterglow and of the diffuse aurora.
     pub(super) fn soft(&self, sources: &Sources) -> ColumnBuffer {
         let (pixel, [_, spread_km]) = (self.coverage.pixel, sources.spread_km);
         let column = (spread_km / 500.0).clamp(pixel, 16.0 * pixel);
@@ -158,8 +158,15 @@ impl ChartBuilder<'_> {
         let sorted_sources = SortedSources::new(&sources.soft, &chart, BLOCK_COLUMNS, self.field, spread_km);
         // Always from the mean profile: a cell that shines for a minute averages thousands of tracks.
         let mut buffer =
-            ColumnBuffer::zeros(chart).integrate(self.field, &self.inputs.tables.red_profiles, &sorted_sources);
+            ColumnBuffer::zeros(chart.clone()).integrate(self.field, &self.inputs.tables.red_profiles, &sorted_sources);
         buffer.sum_red_altitudes();
+        if !sources.diffuse.is_empty() {
+            let sorted_sources =
+                SortedSources::new(&sources.diffuse, &chart, BLOCK_COLUMNS, self.field, sources.diffuse_spread_km);
+            let diffuse =
+                ColumnBuffer::zeros(chart).integrate(self.field, &self.inputs.tables.profiles, &sorted_sources);
+            buffer.add(&diffuse);
+        }
         buffer
     }
 }

@@ -21,7 +21,7 @@ use super::{
     },
 };
 use crate::physics::{
-    emission::{ColorMatching, EMITTERS, LineSet, PerEmitter, SpectralEmitter},
+    emission::{ColorMatching, EMITTERS, LineSet, PerEmitter, SpectralEmitter, camera::DigitalCamera},
     extinction::Extinction,
 };
 
@@ -41,14 +41,14 @@ pub(crate) struct EmitterColors {
 impl EmitterColors {
     /// Precomputes the table for the extinction and the color matching functions of a rendering, and the lines of its emission.
     pub(crate) fn new(rendering: &RenderingParameters, lines: LineSet) -> Self {
-        let RenderingParameters { extinction: air, color_matching, .. } = rendering;
+        let air = &rendering.extinction;
+        let emitters = EMITTERS.map(|emitter| EmitterLines::new(emitter, lines, rendering));
         let colors = (0..=STEPS).map(|step| {
             let root = step as f64 / STEPS as f64;
             let elevation = math::asin(root * root).min(FRAC_PI_2);
-            EMITTERS.map(|emitter| {
-                let [red, green, blue] =
-                    attenuated_color(emitter, lines, *color_matching, air, elevation).map(|value| value as f32);
-                [red, green, blue, if emitter == SpectralEmitter::Nitrogen { 0.0 } else { 1.0 }]
+            emitters.each_ref().map(|emitter| {
+                let [red, green, blue] = emitter.attenuated_color(air, elevation).map(|value| value as f32);
+                [red, green, blue, if emitter.emitter == SpectralEmitter::Nitrogen { 0.0 } else { 1.0 }]
             })
         });
         Self { colors: colors.collect() }
@@ -74,23 +74,37 @@ impl EmitterColors {
     }
 }
 
-/// Attenuated color of a kilorayleigh of an emitter, all lines included.
-fn attenuated_color(
+/// The lines of an emitter.
+struct EmitterLines {
     emitter: SpectralEmitter,
-    lines: LineSet,
-    color_matching: ColorMatching,
-    air: &Extinction,
-    elevation: f64,
-) -> [f64; 3] {
-    if emitter == SpectralEmitter::Nitrogen && lines == LineSet::Observed {
-        let transmittance = air.transmittance(BANDS_NM, elevation);
-        return emitter.color_per_kilorayleigh().map(|value| value * transmittance);
+    /// Wavelength, nm, photons per counted photon, and color per kilorayleigh of each line.
+    lines: Vec<(f64, f64, DVec3)>,
+}
+
+impl EmitterLines {
+    fn new(emitter: SpectralEmitter, lines: LineSet, rendering: &RenderingParameters) -> Self {
+        if emitter == SpectralEmitter::Nitrogen
+            && lines == LineSet::Observed
+            && rendering.color_matching == ColorMatching::Cie1931
+        {
+            return Self { emitter, lines: vec![(BANDS_NM, 1.0, DVec3::from(emitter.color_per_kilorayleigh()))] };
+        }
+        let camera = DigitalCamera::new(rendering.camera_white_k);
+        let mut colored = Vec::new();
+        for (wavelength_nm, photons) in lines.lines(emitter) {
+            let color = DVec3::from(rendering.color_matching.line_color(&camera, wavelength_nm));
+            colored.push((wavelength_nm, photons, color));
+        }
+        Self { emitter, lines: colored }
     }
-    let sum = lines.lines(emitter).into_iter().fold(DVec3::ZERO, |sum, (wavelength_nm, photons)| {
-        let color = DVec3::from(color_matching.line_color(wavelength_nm));
-        sum + color * (photons * air.transmittance(wavelength_nm, elevation))
-    });
-    sum.to_array()
+
+    /// Attenuated color of a kilorayleigh, all lines included.
+    fn attenuated_color(&self, air: &Extinction, elevation: f64) -> [f64; 3] {
+        let sum = self.lines.iter().fold(DVec3::ZERO, |sum, (wavelength_nm, photons, color)| {
+            sum + *color * (photons * air.transmittance(*wavelength_nm, elevation))
+        });
+        sum.to_array()
+    }
 }
 
 impl ColumnBuffer {

@@ -8,7 +8,7 @@ use bansho_base::{
 use crate::{
     render::{
         bin::{SampleTimes, Sources},
-        inputs::emission_inputs,
+        inputs::{RenderInputs, emission_inputs},
         project::field_lines::FieldLines,
     },
     simulate::AuroraSimulation,
@@ -35,13 +35,14 @@ pub(crate) fn step_until(simulation: &mut AuroraSimulation, t: f64) {
 }
 
 /// Sources while the shutter of a view is open.
-pub(super) fn sources(simulation: &AuroraSimulation, view: &View, field: &FieldLines) -> Sources {
-    if is_long(view.shutter) { long_exposure(simulation, view, field) } else { short_exposure(simulation, view, field) }
+pub(super) fn sources(inputs: RenderInputs, view: &View, field: &FieldLines) -> Sources {
+    if is_long(view.shutter) { long_exposure(inputs, view, field) } else { short_exposure(inputs, view, field) }
 }
 
 /// Extrapolated particles of the current state, and its afterglow.
-fn short_exposure(simulation: &AuroraSimulation, view: &View, field: &FieldLines) -> Sources {
-    let inputs = emission_inputs(simulation, view.shutter.middle());
+fn short_exposure(inputs: RenderInputs, view: &View, field: &FieldLines) -> Sources {
+    let simulation = inputs.simulation;
+    let inputs = emission_inputs(simulation, &inputs.tables.diffuse, view.shutter.middle());
     let distance_km = rms_speed(simulation) * view.shutter.duration();
     let count =
         (2.0 * distance_km / (SPREADS_PER_INSTANT * inputs.spread_km())).ceil().clamp(1.0, MAX_INSTANTS) as usize;
@@ -58,8 +59,8 @@ fn short_exposure(simulation: &AuroraSimulation, view: &View, field: &FieldLines
 ///
 /// It starts at the state of [`Stepped::time_for`](bansho_base::phenomenon::Stepped::time_for); in a
 /// loop, where two runs are drawn at the shutter's middle, with that one.
-fn long_exposure(simulation: &AuroraSimulation, view: &View, field: &FieldLines) -> Sources {
-    let mut simulation = simulation.clone();
+fn long_exposure(inputs: RenderInputs, view: &View, field: &FieldLines) -> Sources {
+    let mut simulation = inputs.simulation.clone();
     let (shutter, now) = (view.shutter, simulation.time());
     let begin = if now < shutter.middle() - AuroraSimulation::STEP_S { shutter.open } else { shutter.middle() };
     let mut mean = Sources::default();
@@ -70,7 +71,8 @@ fn long_exposure(simulation: &AuroraSimulation, view: &View, field: &FieldLines)
         let first = instant as u32;
         let times =
             SampleTimes { offsets_s: vec![t - simulation.time()], first_index: first, smear_km: smear_km(distance_km) };
-        mean.add(&Sources::new(&emission_inputs(&simulation, t), field, &times), 1.0 / LONG_INSTANTS as f32);
+        let sources = Sources::new(&emission_inputs(&simulation, &inputs.tables.diffuse, t), field, &times);
+        mean.add(&sources, 1.0 / LONG_INSTANTS as f32);
     }
     mean
 }

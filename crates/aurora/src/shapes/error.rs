@@ -264,6 +264,11 @@ pub enum ShapeErrorKind {
         "single photons are drawn by the rules of the thesis; allowed: `\"single_collisions\"`, or `energy_deposition = \"hard_sphere\"`"
     )]
     PhotonsWithoutSpheres,
+    /// Single photons by the rules of the thesis, which has no sunlight.
+    #[error(
+        "the rules of the thesis for single photons have no sunlight; allowed: `sampling = \"single_collisions\"`, or no `sunlit_above_km`"
+    )]
+    PhotonsInSunlight,
     /// A loop whose length is not a positive number.
     #[error("a loop of {seconds} s is too short; allowed: more than 0 s")]
     LoopLength {

@@ -31,6 +31,8 @@ const MAX_CONCENTRATION: f64 = 6.0;
 const POWER_RELAXATION: f32 = 0.2;
 /// Limits of the global correction for that delay: a step in the animated flux is still followed gradually.
 const BALANCE: [f64; 2] = [0.9, 1.1];
+/// Lateral distance at which the power has fallen to 0, relative to half the thickness: a few particles lie beyond the attraction.
+const PROFILE_REACH: f32 = 1.15;
 /// W for one mW/m^2 on one km^2.
 const W_PER_KM2: f64 = 1e3;
 
@@ -63,14 +65,34 @@ impl EnergyFlux {
         [(PER_COARSE, COARSE), (PER_FINE, FINE)].map(|(per, bounds)| NodeLayout::new(lengths, count / per, bounds))
     }
 
-    /// Target power by sheet and node without pulsation and black rays, W: flux times length times thickness.
-    fn target_power<'a>(&self, refined: &RefinedShape, layout: &'a NodeLayout, time: f64) -> NodeValues<'a> {
+    /// Target power by sheet and node without pulsation and black rays, W: flux times length times thickness, in bright and quiet stretches by the ray
+    /// pattern. The total is that without the pattern.
+    fn target_power<'a>(
+        &self,
+        refined: &RefinedShape,
+        layout: &'a NodeLayout,
+        rays: &RayTable,
+        time: f64,
+    ) -> NodeValues<'a> {
         let width = 2.0 * self.parameters.half_thickness_km();
         let flux = self.parameters.flux_mw_per_m2.at(time) * W_PER_KM2 * width;
-        let mut target = NodeValues::new(layout);
+        let lengths = refined.sheet_lengths();
+        let [mut even, mut patterned] = [0.0; 2];
+        let mut pieces = Vec::new();
         // Pieces of at most half an interval: bridges have fewer segments than nodes.
         for piece in refined.pieces(|sheet| 0.5 / (layout.count(sheet) - 1) as f64) {
-            target.add(piece.sheet as u32, piece.fraction as f32, flux * piece.flux * piece.length_km);
+            let half = 0.5 * piece.length_km / lengths[piece.sheet].max(f64::MIN_POSITIVE);
+            let part = [piece.fraction - half, piece.fraction + half];
+            let power = piece.flux * piece.length_km;
+            let bright = power * self.rays.mean_brightness(rays, piece.sheet, part);
+            even += power;
+            patterned += bright;
+            pieces.push((piece, bright));
+        }
+        let scale = if patterned > 0.0 { flux * even / patterned } else { flux };
+        let mut target = NodeValues::new(layout);
+        for (piece, bright) in pieces {
+            target.add(piece.sheet as u32, piece.fraction as f32, scale * bright);
         }
         target
     }
@@ -113,7 +135,7 @@ impl EnergyFlux {
         let weights: Vec<_> =
             tasks.map(|(chunk, weighted)| chunk.accumulate_weights(&weighted.weights, &lengths, &coarse)).collect();
         let weights = weights.iter().fold(NodeValues::new(&coarse), |sum, chunk| sum.plus(chunk));
-        let factors = self.target_power(refined, &coarse, time).distributed_by(&weights, MAX_CONCENTRATION);
+        let factors = self.target_power(refined, &coarse, rays, time).distributed_by(&weights, MAX_CONCENTRATION);
         let totals: Vec<[f64; 2]> =
             chunks(particles).into_par_iter().with_max_len(1).map(|chunk| chunk.assign_powers(&factors)).collect();
         balance(particles, &totals);
@@ -171,7 +193,7 @@ impl EnergyFlux {
                     chunk.powers[index] = chunk.fades[index] * chunk.full_powers[index];
                     continue;
                 };
-                let weight = projection.flux as f32 * pattern.brightness[lane];
+                let weight = projection.flux as f32 * pattern.brightness[lane] * lateral_profile(inputs.side[lane]);
                 weighted.counts.add(projection.sheet, projection.fraction as f32, f64::from(chunk.fades[index]));
                 weighted.weights[index] = weight;
                 chunk.powers[index] = -weight * pattern.dimming[lane];
@@ -183,6 +205,13 @@ impl EnergyFlux {
         }
         weighted
     }
+}
+
+/// Power by lateral position, -1 to 1 within the thickness, relative to the middle. Particles fill the thickness evenly; sheets as bright at their
+/// sides as in their middle would have hard edges where a fold is seen along its tangent, which photographs of curtains do not have.
+fn lateral_profile(side: f32) -> f32 {
+    let squared = (side * side * (1.0 / (PROFILE_REACH * PROFILE_REACH))).min(1.0);
+    (1.0 - squared) * (1.0 - squared)
 }
 
 /// Weights of a chunk of particles.
@@ -268,7 +297,8 @@ mod tests {
 
     #[test]
     fn a_sheet_of_a_few_pieces_is_as_bright_everywhere() {
-        let (parameters, key) = (AuroraParameters::default(), Key::new(2, "precipitation"));
+        let (mut parameters, key) = (AuroraParameters::default(), Key::new(2, "precipitation"));
+        parameters.rays.contrast = 0.0;
         // As long as a bridge over a gap.
         let points = vec![DVec2::ZERO, DVec2::new(17.0, 0.0)];
         let sheet = Sheet { points, flux: vec![1.0; 2], energy: vec![1.0; 2] };
@@ -280,7 +310,8 @@ mod tests {
         let intervals = layout.count(0) - 1;
         let pieces = refined.pieces(|_| 1.0).count();
         assert!(pieces < intervals / 2, "{pieces} pieces");
-        let wanted = energy_flux.target_power(&refined, &layout, 0.0);
+        let rays = energy_flux.ray_table(&refined, 0.0);
+        let wanted = energy_flux.target_power(&refined, &layout, &rays, 0.0);
         let length = refined.sheet_lengths()[0];
         let flux = parameters.flux_mw_per_m2.at(0.0) * W_PER_KM2 * 2.0 * parameters.half_thickness_km();
         assert!((wanted.sum() / (flux * length) - 1.0).abs() < 1e-9);
@@ -288,5 +319,45 @@ mod tests {
         for node in &wanted.of_sheet(0)[1..intervals] {
             assert!((node / even - 1.0).abs() < 0.05, "{node} W for {even} W");
         }
+    }
+
+    /// The mean of `(1 - (s / r)^2)^2` from s = 0 to 1 is 1 - 2 / (3 r^2) + 1 / (5 r^4): 0.610 for r = 1.15.
+    #[test]
+    fn the_middle_of_a_sheet_is_1_6_times_as_bright_as_the_mean() {
+        let steps = 1000;
+        let mean =
+            (0..steps).map(|step| lateral_profile((step as f32 + 0.5) / steps as f32)).sum::<f32>() / steps as f32;
+        assert!((lateral_profile(0.0) / mean - 1.0 / 0.610).abs() < 0.005, "{mean}");
+        assert_eq!([-1.2, 1.15, 3.0].map(lateral_profile), [0.0; 3]);
+        assert!(lateral_profile(0.5) == lateral_profile(-0.5) && lateral_profile(1.0) < 0.07);
+    }
+
+    #[test]
+    fn rays_make_bright_and_quiet_stretches_of_the_same_total() {
+        let key = Key::new(2, "precipitation");
+        let points = vec![DVec2::ZERO, DVec2::new(500.0, 0.0)];
+        let shape = Shape { sheets: vec![Sheet { points, flux: vec![1.0; 2], energy: vec![1.0; 2] }] };
+        let powers = |contrast: f64, outer_scale_km: f64| {
+            let mut parameters = AuroraParameters::default();
+            (parameters.rays.contrast, parameters.rays.outer_scale_km) = (contrast, outer_scale_km);
+            let (folds, arc_map) = (FoldModel::new(&parameters, key), ArcLengthMap::alone(&shape));
+            let refined = RefinedShape::new(&shape, &[], &arc_map, &folds, 0.0, 20.0);
+            let energy_flux = EnergyFlux::new(&parameters, key);
+            let [layout, _] = energy_flux.layouts(&refined.sheet_lengths());
+            let rays = energy_flux.ray_table(&refined, 0.0);
+            let target = energy_flux.target_power(&refined, &layout, &rays, 0.0);
+            let nodes = target.of_sheet(0)[1..layout.count(0) - 1].to_vec();
+            (target.sum(), nodes)
+        };
+        let (even, _) = powers(0.0, 80.0);
+        let spread = |nodes: &[f64]| {
+            let mean = nodes.iter().sum::<f64>() / nodes.len() as f64;
+            (nodes.iter().map(|node| (node - mean) * (node - mean)).sum::<f64>() / nodes.len() as f64).sqrt() / mean
+        };
+        let (total, nodes) = powers(0.6, 80.0);
+        assert!((total / even - 1.0).abs() < 1e-9, "{total} of {even}");
+        assert!(spread(&nodes) > 0.25, "{}", spread(&nodes));
+        let (_, nodes) = powers(0.6, 2.5);
+        assert!(spread(&nodes) < 0.15, "rays alone are finer than the intervals: {}", spread(&nodes));
     }
 }

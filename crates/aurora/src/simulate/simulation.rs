@@ -125,7 +125,7 @@ impl AuroraSimulation {
     /// The aurora `name` at the start of its preroll: particles at rest, uniformly distributed about the first shape.
     #[must_use]
     pub fn new(parameters: AuroraParameters, sequence: impl Into<Arc<Sequence>>, name: &str, seed: u64) -> Self {
-        let emission = parameters.rendering.emission(parameters.spectrum);
+        let emission = parameters.rendering.emission(parameters.spectrum, parameters.sunlit_above_km);
         Self::with_emission(parameters, sequence.into(), emission, name, seed)
     }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use bansho::SceneOptions;
+use bansho::{SceneOptions, base::math};
 
 use crate::{
     SMALL,
@@ -23,10 +23,26 @@ fn without_sky(text: &str) -> String {
     format!("{before}[[aurora]]{aurora}")
 }
 
+/// The text of `quiet_arc` with one thin, straight arc without diffuse light.
+fn single_arc() -> String {
+    let text = without_sky(&scene_text("quiet_arc"));
+    let (before, _) = text.split_once("[[aurora.shapes]]").unwrap();
+    let mut arc = String::new();
+    for line in before
+        .lines()
+        .filter(|line| !["diffuse", "folds", "rays", "swirls", "thickness_km"].iter().any(|key| line.starts_with(key)))
+    {
+        arc += line;
+        arc += "\n";
+    }
+    arc + "thickness_km = 2.0\ndiffuse = { fraction = 0.0 }\nrays = { contrast = 0.3, energy_variation = 0.0 }\nfolds = { amplitude_km = 0.0 }\nswirls = { displacement_km = 0.0 }\n[[aurora.shapes]]\n\
+        sheets = [{ form = \"arc\", length_km = 760.0, position_km = [-20.0, -190.0] }]\n"
+}
+
 /// From its brightest height to a tenth of that light, the aurora's light takes three times as long a way upward as downward.
 #[test]
 fn an_arc_has_a_thin_lower_edge_and_a_fading_top() {
-    let light = block_luminances(&without_sky(&scene_text("quiet_arc")), SMALL, 1, &[EARLY]).remove(0);
+    let light = block_luminances(&single_arc(), SMALL, 1, &[EARLY]).remove(0);
     let rows: Vec<f64> = light.chunks(SMALL[0]).map(|row| row[60..200].iter().sum()).collect();
     let peak = (0..rows.len()).max_by(|a, b| rows[*a].total_cmp(&rows[*b])).unwrap();
     let [up, down] = [(0..=peak).rev().collect(), (peak..rows.len()).collect::<Vec<_>>()].map(|way: Vec<usize>| {
@@ -45,7 +61,7 @@ fn across_radii(film: &Film, center: [f64; 2]) -> f64 {
             let at = |x: usize, y: usize| luminance(film.row(0, y)[x]).sqrt();
             let gradient = [at(column + 1, row) - at(column - 1, row), at(column, row + 1) - at(column, row - 1)];
             let offset = [column as f64 + 0.5 - center[0], row as f64 + 0.5 - center[1]];
-            let distance = bansho::base::math::hypot(offset[0], offset[1]);
+            let distance = math::hypot(offset[0], offset[1]);
             if !(20.0..60.0).contains(&distance) {
                 continue;
             }
@@ -59,7 +75,21 @@ fn across_radii(film: &Film, center: [f64; 2]) -> f64 {
 
 #[test]
 fn the_rays_of_a_corona_converge_at_the_magnetic_zenith() {
-    let film = film("corona", &[EARLY]);
+    // A ring around the zenith, open toward the south-west.
+    let mut ring = Vec::new();
+    for step in 0..=20 {
+        let (sin, cos) = math::sin_cos(0.3 * f64::from(step));
+        ring.push(format!("[{:.1}, {:.1}]", 70.0 * sin, 23.0 - 70.0 * cos));
+    }
+    let mut text = String::new();
+    for line in scene_text("corona").split_once("[[aurora.shapes]]").unwrap().0.lines() {
+        if !["diffuse", "rays"].iter().any(|key| line.starts_with(key)) {
+            text += &format!("{line}\n");
+        }
+    }
+    text += "diffuse = { fraction = 0.0 }\nrays = { contrast = 1.0, outer_scale_km = 10.0, spacing_km = 2.0 }\n";
+    text += &format!("[[aurora.shapes]]\nsheets = [{{ points = [{}] }}]\n", ring.join(", "));
+    let film = Film::of_text(&text, SMALL, &[EARLY], &SceneOptions::default());
     let zenith = across_radii(&film, [128.0, 76.5]);
     for [x, y] in [[-45.0, 0.0], [45.0, 0.0], [0.0, -30.0], [0.0, 30.0]] {
         let elsewhere = across_radii(&film, [128.0 + x, 76.5 + y]);
@@ -69,27 +99,31 @@ fn the_rays_of_a_corona_converge_at_the_magnetic_zenith() {
 
 #[test]
 fn soft_electrons_make_a_red_top_over_a_green_foot() {
-    let film = film("red_aurora", &[EARLY]);
+    let text = without_sky(&scene_text("red_aurora"));
+    let film = Film::of_text(&text, SMALL, &[EARLY], &SceneOptions::default());
     let ratio = |rows: Range<usize>| {
         film.mean_over(rows.clone(), 0..SMALL[0], |[red, ..]| red)
             / film.mean_over(rows, 0..SMALL[0], |[_, green, _]| green)
     };
-    let (top, foot) = (ratio(5..40), ratio(92..100));
-    assert!(top > 4.5 && foot < 1.5, "red beside green: {top} at the top, {foot} at the foot");
+    let (top, foot) = (ratio(6..24), ratio(84..94));
+    assert!(top > 2.0 && foot < 0.7, "red beside green: {top} at the top, {foot} at the foot");
 }
 
 #[test]
 fn a_lake_mirrors_the_sky_and_is_darker() {
-    const HORIZON: usize = 78;
+    // The camera is tilted by this angle, and half of its field of view is 36 degrees.
+    let (tilt, half_fov) = (math::atan(9.3 / 60.3), 36.0_f64.to_radians());
+    let row_of = |elevation: f64| (72.0 - 72.0 * math::tan(elevation - tilt) / math::tan(half_fov)) as usize;
     let film = film("lake", &[EARLY]);
     let column_means = |row: usize| -> Vec<f64> {
         let of = |block: usize| film.mean_over(row..row + 3, 16 * block..16 * block + 16, luminance);
         (0..16).map(of).collect()
     };
     let (mut above, mut below) = (Vec::new(), Vec::new());
-    for height in (6..60).step_by(3) {
-        above.extend(column_means(HORIZON - height - 3));
-        below.extend(column_means(HORIZON + height));
+    for elevation_deg in (6..20).step_by(2) {
+        let elevation = f64::from(elevation_deg).to_radians();
+        above.extend(column_means(row_of(elevation) - 1));
+        below.extend(column_means(row_of(-elevation) - 1));
     }
     let center = |values: &[f64]| -> (f64, Vec<f64>) {
         let mean = values.iter().sum::<f64>() / values.len() as f64;

@@ -10,7 +10,7 @@ use fearless_simd::{Level, dispatch};
 
 pub use gradient::Dimension;
 
-use crate::math::{approximations, random::murmur3};
+use crate::math::{self, approximations, random::murmur3};
 
 /// Points processed together, at every vector width.
 pub const LANES: usize = 16;
@@ -64,6 +64,18 @@ pub struct Fractal {
 impl Fractal {
     /// A single octave.
     pub const SINGLE: Self = Self { octaves: 1, lacunarity: 2, gain: 0.5 };
+
+    /// Standard deviation of the noise in `dimensions` dimensions, 2 to 4: that of independent octaves, whose amplitudes add up to 1.
+    #[must_use]
+    pub fn standard_deviation(&self, dimensions: usize) -> f64 {
+        let [mut sum, mut squares, mut amplitude] = [0.0, 0.0, 1.0];
+        for _ in 0..self.octaves {
+            sum += amplitude;
+            squares += amplitude * amplitude;
+            amplitude *= f64::from(self.gain);
+        }
+        math::sqrt(VARIANCE[dimensions - 2] * squares) / sum
+    }
 }
 
 impl Default for Fractal {

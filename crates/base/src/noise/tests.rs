@@ -48,6 +48,24 @@ fn values_lie_within_one_with_mean_zero_and_the_stated_variance() {
 }
 
 #[test]
+fn octaves_have_the_stated_standard_deviation() {
+    for fractal in [Fractal { octaves: 3, lacunarity: 2, gain: 0.6 }, Fractal { octaves: 6, lacunarity: 2, gain: 0.8 }]
+    {
+        let (noise, count) = (noise::<3>(5, fractal, [0; 3]), 100_000);
+        let mut squares = 0.0;
+        for index in 0..count {
+            let value = f64::from(noise.at(random_point(index)));
+            squares += value * value;
+        }
+        let found = (squares / count as f64).sqrt();
+        assert!((found / fractal.standard_deviation(3) - 1.0).abs() < 0.02, "{fractal:?}: {found}");
+    }
+    // Weights of 1/1.5 and 0.5/1.5 of equal variances.
+    let two = Fractal { octaves: 2, lacunarity: 2, gain: 0.5 };
+    assert!((two.standard_deviation(2) - (VARIANCE[0] * 1.25).sqrt() / 1.5).abs() < 1e-12);
+}
+
+#[test]
 fn stated_variances_are_those_of_the_formula() {
     // Exact integrals of the fade's polynomial: of s^2, s^2 f and s^2 f^2.
     let s2 = 36.0 / 11.0 - 180.0 / 10.0 + 345.0 / 9.0 - 300.0 / 8.0 + 100.0 / 7.0;

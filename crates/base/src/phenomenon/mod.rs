@@ -177,6 +177,8 @@ pub struct PhenomenonInfo<'a> {
     pub refracts: bool,
     /// How to make it stronger, as worded in a remark.
     pub strengthened_by: &'static str,
+    /// Number of [`Publication::sky_lights`] with which it lights plates; 0 if it does not.
+    pub sky_lights: usize,
 }
 
 impl<'a> PhenomenonInfo<'a> {
@@ -184,7 +186,7 @@ impl<'a> PhenomenonInfo<'a> {
     #[must_use]
     pub fn new(name: &'a str) -> Self {
         let strengthened_by = "make it larger or brighter";
-        Self { name, aovs: &[], stepping: None, mirror: None, refracts: false, strengthened_by }
+        Self { name, aovs: &[], stepping: None, mirror: None, refracts: false, strengthened_by, sky_lights: 0 }
     }
 }
 

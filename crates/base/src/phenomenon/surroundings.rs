@@ -176,6 +176,9 @@ impl Emitter {
 pub struct Publication {
     /// Lights that approximate its emission.
     pub lights: Vec<Light>,
+    /// In place of `lights` for what a plate shows, if it is a light over the sky: lights at infinity in directions that do not change, so that their shadows
+    /// are computed once. Otherwise empty.
+    pub sky_lights: Vec<Light>,
     /// Homogeneous extinction coefficient, 1/m.
     pub extinction: f64,
     /// Solid obstacles.
@@ -195,6 +198,7 @@ impl Publication {
     /// Adds the publication of another phenomenon.
     pub fn extend(&mut self, other: &Self) {
         self.lights.extend_from_slice(&other.lights);
+        self.sky_lights.extend_from_slice(&other.sky_lights);
         self.extinction += other.extinction;
         self.occluders.extend_from_slice(&other.occluders);
         self.shadow_casters.extend_from_slice(&other.shadow_casters);

@@ -6,6 +6,7 @@
 //!
 //! # References
 //! - Allen's Astrophysical Quantities, 4th edition (2000): numbers of stars by magnitude.
+//! - M. F. Walker (1977), R. H. Garstang (1986): glow of a town; see [`TownGlow`](bansho_base::world::sky::TownGlow).
 //! - A. F. J. Moffat, Astron. Astrophys. 3 (1969): point spread function of a star's image.
 //!
 //! # Equations
@@ -14,6 +15,7 @@
 //! | --- | --- |
 //! | radiance by day, by elevation | [`Sky::radiance_at_elevations`](bansho_base::world::sky::Sky::radiance_at_elevations) |
 //! | radiance by night: the azimuth-independent radiance of an almucantar, twilight glow and Milky Way | `night::NightSky::radiance` |
+//! | glow of a town by population, distance, elevation and azimuth | [`TownGlow::luminance`](bansho_base::world::sky::TownGlow::luminance) |
 //! | number of stars brighter than a magnitude | `stars::log_count`, `stars::magnitude_of_rank` |
 //! | illuminance of a star, `2.54e-6 lux * 10^(-0.4 m)` | `stars::star` |
 //! | Moffat's point spread function, `(1 + (r / core)^2)^-5/2` | `stars::StarImage::psf_row` |
@@ -44,7 +46,7 @@ use bansho_base::{
     world::sky::{Sky, SkyKind, SkyObserver},
 };
 use night::NightSky;
-pub use parameters::{NightParameters, SkyParameters};
+pub use parameters::{HillForm, NightParameters, SkyParameters, TownParameters};
 use render::SkyCache;
 use skyline::Skyline;
 use stars::Stars;
@@ -116,6 +118,6 @@ impl SkyBackdrop {
     /// Depth interval of the hills.
     fn hills(&self) -> DepthInterval {
         let near = self.parameters.hills_distance;
-        DepthInterval { near, far: near * (1.0 + 1e-4) }
+        DepthInterval { near, far: near * (self.parameters.hills_form.farthest_range() + 1e-4) }
     }
 }

@@ -1,13 +1,16 @@
 //! Radiance of the night sky by direction, without its stars.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use bansho_base::{
     camera::directions::Directions,
     color,
+    host::parallel::prelude::*,
     math::{
         self, DVec3,
         simd::{FourLanes, LANES, Real},
     },
-    world::sky::{Night, Sky, SkyObserver},
+    world::sky::{Night, Sky, SkyObserver, TownGlow},
 };
 use fearless_simd::prelude::*;
 
@@ -15,6 +18,8 @@ use super::stars;
 
 /// Steps of elevation from the horizon to the zenith, uniform in the square root of the sine above that of the horizon.
 const ELEVATION_STEPS: usize = 512;
+/// Steps of the town's glow: of elevation, spaced as those above, and of the sine of half the difference of azimuth to the town.
+const TOWN_STEPS: [usize; 2] = [96, 96];
 /// Luminance of the Milky Way's center line, cd/m^2, its width in sines, and its color temperature, K.
 const MILKY_WAY_LUMINANCE: f64 = 1.6e-4;
 const MILKY_WAY_WIDTH: f64 = 0.14;
@@ -31,6 +36,18 @@ pub(crate) struct NightSky {
     /// Unit vectors toward the sun (below the horizon) and to the galactic pole.
     sunward: [f32; 3],
     pole: [f32; 3],
+    town: Option<TownTable>,
+}
+
+/// Rows of elevations, from the horizon up.
+type TownLuminances = Vec<[f32; TOWN_STEPS[1] + 1]>;
+
+/// Luminance of a town's glow, cd/m^2.
+struct TownTable {
+    luminances: Arc<TownLuminances>,
+    color: [f32; 4],
+    /// Horizontal unit vector toward the town.
+    toward: [f32; 3],
 }
 
 /// The directions of one elevation; colors are red, green, blue and 0.
@@ -69,12 +86,30 @@ impl NightSky {
             per_range: (1.0 / (1.0 - horizon)) as f32,
             sunward: night.sunward().as_vec3().to_array(),
             pole: stars::galactic_pole().as_vec3().to_array(),
+            town: TownTable::new(night),
         }
     }
 
     /// Radiance in the directions of unit vectors.
     #[inline(always)]
     pub(crate) fn radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
+        let mut colors = self.natural_radiance(simd, directions);
+        let Some(town) = &self.town else { return colors };
+        let [xs, ys, zs] = &directions.components;
+        for i in 0..LANES {
+            if ys[i] >= self.horizon {
+                let glow = town.luminance([xs[i], ys[i], zs[i]]);
+                for c in 0..3 {
+                    colors[i][c] = glow.fma(town.color[c], colors[i][c]);
+                }
+            }
+        }
+        colors
+    }
+
+    /// Radiance without the town's glow.
+    #[inline(always)]
+    pub(super) fn natural_radiance<S: Simd>(&self, simd: S, directions: &Directions) -> [[f32; 4]; LANES] {
         let [xs, ys, zs] = &directions.components;
         let (mut steps, mut toward, mut milky_way_weights) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
@@ -98,6 +133,56 @@ impl NightSky {
             }
         }
         colors
+    }
+}
+
+/// The table of a town's glow. That of the town before is kept: it takes tens of milliseconds, and all views and frames of a scene have the same.
+fn town_luminances(glow: &TownGlow) -> Arc<TownLuminances> {
+    static LAST: Mutex<Option<(TownGlow, Arc<TownLuminances>)>> = Mutex::new(None);
+    let lock = || LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, luminances)) = lock().as_ref().filter(|(known, _)| known == glow) {
+        return luminances.clone();
+    }
+    // Not while the lock is held: this works in parallel.
+    let mut luminances = vec![[0.0; TOWN_STEPS[1] + 1]; TOWN_STEPS[0] + 1];
+    luminances.par_iter_mut().enumerate().for_each(|(row, luminances)| {
+        let root = row as f64 / TOWN_STEPS[0] as f64;
+        let elevation = math::asin(root * root);
+        for (column, luminance) in luminances.iter_mut().enumerate() {
+            let half_sine = column as f64 / TOWN_STEPS[1] as f64;
+            *luminance = glow.luminance(elevation, 1.0 - 2.0 * half_sine * half_sine) as f32;
+        }
+    });
+    let luminances = Arc::new(luminances);
+    *lock() = Some((*glow, luminances.clone()));
+    luminances
+}
+
+impl TownTable {
+    /// `None` without a town.
+    fn new(night: &Night) -> Option<Self> {
+        let glow = night.town.as_ref()?;
+        let toward = night.townward().as_vec3().to_array();
+        Some(Self { luminances: town_luminances(glow), color: with_zero(night.town_color()), toward })
+    }
+
+    /// Luminance from the direction of a unit vector, linear between steps.
+    #[inline(always)]
+    fn luminance(&self, [x, y, z]: [f32; 3]) -> f32 {
+        let level = x.fma(x, z * z).sqrt().max(1e-9);
+        let azimuth_cosine = x.fma(self.toward[0], z * self.toward[2]) / level;
+        let half_sine = azimuth_cosine.fma(-0.5, 0.5).clamp(0.0, 1.0).sqrt();
+        let [row, column] = [y.clamp(0.0, 1.0).sqrt() * TOWN_STEPS[0] as f32, half_sine * TOWN_STEPS[1] as f32];
+        let [first_row, first_column] =
+            [(row as usize).min(TOWN_STEPS[0] - 1), (column as usize).min(TOWN_STEPS[1] - 1)];
+        let [down, across] = [row - first_row as f32, column - first_column as f32];
+        let mut rows = [0.0; 2];
+        for (row, luminance) in rows.iter_mut().enumerate() {
+            let luminances = &self.luminances[first_row + row];
+            let [before, after] = [luminances[first_column], luminances[first_column + 1]];
+            *luminance = across.fma(after - before, before);
+        }
+        down.fma(rows[1] - rows[0], rows[0])
     }
 }
 

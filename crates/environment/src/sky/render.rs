@@ -10,7 +10,7 @@ use std::{
 use bansho_base::{
     camera::{Camera, directions::Directions},
     image::Rect,
-    math::{DVec2, DVec3, MulAdd, approximations, simd::LANES},
+    math::{self, DVec2, DVec3, MulAdd, approximations, simd::LANES},
     phenomenon::{
         PlateRole, Prepared,
         strip::{DepthInterval, Strip, View},
@@ -21,12 +21,24 @@ use fearless_simd::{Simd, dispatch};
 
 use super::{
     night::NightSky,
-    skyline::Skyline,
+    skyline::{Ridge, Skyline},
     stars::{MAX_IMAGE_WIDTH, StarImage},
 };
 
 /// Radiance of hills and trees relative to the zenith.
 pub(super) const HILL_SHADE: f32 = 0.04;
+/// Scattering of clear air at the ground, 1/m, as for the glow of a town: by night its light lies over the hills.
+const SCATTERING_PER_M: f64 = 4e-5;
+/// Sine of the elevation of the sky whose radiance that light has.
+const AIRLIGHT_SINE: f32 = 0.02;
+
+/// What is seen of the ranges of hills at sixteen pixels.
+struct VisibleRanges {
+    /// Opacity of the air before them.
+    haze: [f32; LANES],
+    /// Distance of the one that is seen most, m.
+    distances: [f32; LANES],
+}
 
 /// The sky of a frame.
 pub(super) struct PreparedSky<'a> {
@@ -148,13 +160,17 @@ impl PreparedSky<'_> {
         }
     }
 
-    /// Draws hills and trees as a dark silhouette.
+    /// Draws hills and trees as a dark silhouette, by night with airlight before them.
     #[inline(always)]
-    pub(super) fn draw_hills(&self, skyline: &Skyline, strip: &mut Strip) {
+    pub(super) fn draw_hills<S: Simd>(&self, simd: S, skyline: &Skyline, strip: &mut Strip) {
         let rect = strip.rect;
         let shade = self.sky.radiance(DVec3::Y).map(|value| value * HILL_SHADE);
         let near = self.hills.near as f32;
-        let highest = skyline.highest + 1.0 / self.view.camera.focal_pixels as f32;
+        let mut opacities = Vec::with_capacity(skyline.ranges.len());
+        for (distance, _) in &skyline.ranges {
+            opacities.push(1.0 - math::exp(-SCATTERING_PER_M * distance * self.hills.near) as f32);
+        }
+        let highest = skyline.outline.highest + 1.0 / self.view.camera.focal_pixels as f32;
         let mut x = rect.x / LANES * LANES;
         while x < rect.right() {
             if self.is_above(rect, x, highest) {
@@ -163,7 +179,7 @@ impl PreparedSky<'_> {
             }
             let inside = rect.x.max(x) - x..rect.right().min(x + LANES) - x;
             for y in rect.y..rect.bottom() {
-                let mut coverage = self.coverage(skyline, x, y);
+                let mut coverage = self.coverage(&skyline.outline, x, y);
                 let first = (y - rect.y) * rect.width + x + inside.start - rect.x;
                 if strip.has_plate() {
                     for i in inside.clone() {
@@ -173,12 +189,14 @@ impl PreparedSky<'_> {
                 if coverage == [0.0; LANES] {
                     continue;
                 }
+                let airlight = self.airlight(simd, x, y);
+                let VisibleRanges { haze, distances } = self.visible_ranges(skyline, &opacities, x, y);
                 let (mut planes, mut depths) = ([[0.0; LANES]; 3], [f32::INFINITY; LANES]);
                 for i in 0..LANES {
                     for c in 0..3 {
-                        planes[c][i] = shade[c] * coverage[i];
+                        planes[c][i] = airlight[i][c].fma(haze[i], shade[c]) * coverage[i];
                     }
-                    depths[i] = if coverage[i] > 0.0 { near } else { f32::INFINITY };
+                    depths[i] = if coverage[i] > 0.0 { distances[i] } else { f32::INFINITY };
                 }
                 let [red, green, blue] = &planes;
                 let light = [&red[inside.clone()], &green[inside.clone()], &blue[inside.clone()]];
@@ -188,13 +206,48 @@ impl PreparedSky<'_> {
         }
     }
 
-    /// Coverage of pixels from `x` on in row `y` by the hills, averaged over the exposure.
+    /// What is seen of the ranges at pixels from `x` on in row `y`, with the opacities of the air before each.
     #[inline(always)]
-    pub(super) fn coverage(&self, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+    fn visible_ranges(&self, skyline: &Skyline, opacities: &[f32], x: usize, y: usize) -> VisibleRanges {
+        let (mut haze, mut distances) = ([0.0; LANES], [0.0; LANES]);
+        let (mut open, mut most) = ([1.0_f32; LANES], [0.0; LANES]);
+        let last = skyline.ranges.len() - 1;
+        for (number, (distance, ridge)) in skyline.ranges.iter().enumerate() {
+            let distance = (distance * self.hills.near) as f32;
+            // What is above all others belongs to the farthest.
+            let coverage = if number == last { [1.0; LANES] } else { self.coverage(ridge, x, y) };
+            for i in 0..LANES {
+                let seen = open[i] * coverage[i];
+                haze[i] = seen.fma(opacities[number], haze[i]);
+                distances[i] = if seen > most[i] { distance } else { distances[i] };
+                most[i] = seen.max(most[i]);
+                open[i] -= seen;
+            }
+        }
+        VisibleRanges { haze, distances }
+    }
+
+    /// Radiance of the night sky just above the horizon at the azimuths of pixels from `x` on in row `y`, without the glow of a town, most of which lies
+    /// behind the hills; 0 by day.
+    #[inline(always)]
+    fn airlight<S: Simd>(&self, simd: S, x: usize, y: usize) -> [[f32; 4]; LANES] {
+        let Some(cache) = &self.cache else { return [[0.0; 4]; LANES] };
+        let mut directions = Directions::new(&self.view.camera, x, y);
+        let [xs, ys, zs] = &mut directions.components;
+        for i in 0..LANES {
+            let level = xs[i].fma(xs[i], zs[i] * zs[i]).sqrt().max(1e-9);
+            [xs[i], ys[i], zs[i]] = [xs[i] / level, AIRLIGHT_SINE, zs[i] / level];
+        }
+        cache.night.natural_radiance(simd, &directions)
+    }
+
+    /// Coverage of pixels from `x` on in row `y` by the hills below a ridge, averaged over the exposure.
+    #[inline(always)]
+    pub(super) fn coverage(&self, ridge: &Ridge, x: usize, y: usize) -> [f32; LANES] {
         let weight = 1.0 / self.cameras.len() as f32;
         let mut mean = [0.0; LANES];
         for camera in &self.cameras {
-            let coverage = hill_coverage(camera, skyline, x, y);
+            let coverage = hill_coverage(camera, ridge, x, y);
             for i in 0..LANES {
                 mean[i] = coverage[i].fma(weight, mean[i]);
             }
@@ -226,7 +279,7 @@ impl PreparedSky<'_> {
         let [width, height] = self.view.size;
         // No lens shows more than 1 / f radians in a pixel. The middle of a square is at most 0.71 of its side from its corners, and edges are a pixel wide.
         let margin = 0.8 * SQUARE_SIDE as f64 / self.view.camera.focal_pixels;
-        let sines = f64::from(skyline.lowest) - margin..f64::from(skyline.highest) + margin;
+        let sines = f64::from(skyline.outline.lowest) - margin..f64::from(skyline.outline.highest) + margin;
         let mut rows_of_squares = (0..height.div_ceil(SQUARE_SIDE)).filter(|&row| self.has_square_within(row, &sines));
         let Some(first) = rows_of_squares.next() else { return Rect::default() };
         let last = rows_of_squares.next_back().unwrap_or(first);
@@ -253,15 +306,15 @@ const SQUARE_SIDE: usize = 16;
 
 /// Coverage of pixels from `x` on in row `y` by the hills, for one camera.
 #[inline(always)]
-pub(super) fn hill_coverage(camera: &Camera, skyline: &Skyline, x: usize, y: usize) -> [f32; LANES] {
+pub(super) fn hill_coverage(camera: &Camera, ridge: &Ridge, x: usize, y: usize) -> [f32; LANES] {
     let sharpness = camera.focal_pixels as f32;
     let mut directions = Directions::new(camera, x, y);
     directions.normalize();
     let Directions { components: [xs, sines, zs], visible: seen } = &directions;
     let (mut above, mut below) = (true, true);
     for i in 0..LANES {
-        above &= sines[i] > skyline.highest + 1.0 / sharpness;
-        below &= sines[i] < skyline.lowest - 1.0 / sharpness;
+        above &= sines[i] > ridge.highest + 1.0 / sharpness;
+        below &= sines[i] < ridge.lowest - 1.0 / sharpness;
     }
     let (mut coverage, mut turns) = ([0.0; LANES], [0.0; LANES]);
     if above {
@@ -274,7 +327,7 @@ pub(super) fn hill_coverage(camera: &Camera, skyline: &Skyline, x: usize, y: usi
         }
     }
     for i in 0..LANES {
-        let hidden = if below { 1.0 } else { skyline.sine(turns[i]) };
+        let hidden = if below { 1.0 } else { ridge.sine(turns[i]) };
         let cover = (hidden - sines[i]).fma(sharpness, 0.5).clamp(0.0, 1.0);
         coverage[i] = if seen[i] { cover } else { 0.0 };
     }
@@ -302,7 +355,7 @@ impl Prepared for PreparedSky<'_> {
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
         let level = bansho_base::math::simd::level();
         if let Some(skyline) = self.skyline.filter(|_| slice.contains(self.hills.near)) {
-            dispatch!(level, _simd => self.draw_hills(skyline, strip));
+            dispatch!(level, simd => self.draw_hills(simd, skyline, strip));
         }
         if slice.overlaps(&FAR) {
             dispatch!(level, simd => self.draw_sky(simd, strip));

@@ -6,8 +6,7 @@ use bansho_base::{
     camera::CameraParameters,
     host::observer::Unobserved,
     image::Rect,
-    math,
-    math::curve::Interpolation,
+    math::{self, DVec2, curve::Interpolation},
     parameters::animated::Animated,
     phenomenon::{
         Run,
@@ -85,6 +84,71 @@ fn night_in(backdrop: &SkyBackdrop, rect: Rect, has_plate: bool) -> [Vec<f32>; 3
     strip.reset(rect, has_plate.then_some(&rows), 0);
     prepared.draw(&DepthInterval::ALL, &mut strip);
     strip.radiance
+}
+
+/// A northern night sky drawn without stars and Milky Way, and its view of 150 x 90 pixels.
+fn northern_night(parameters: SkyParameters) -> (View, Sky, Strip) {
+    let night = NightParameters { stars: 0.0, milky_way: 0.0, ..parameters.night };
+    let parameters = SkyParameters { kind: SkyKind::Night, night, ..parameters };
+    let camera = CameraParameters {
+        position: [0.0, 2.0, 0.0].into(),
+        target: [0.0, 14.0, -60.0].into(),
+        vertical_fov_deg: 60.0.into(),
+        ..CameraParameters::default()
+    };
+    let view = View::new(camera, Shutter { open: 0.0, close: 0.0 }, 0.0, [150, 90], 0);
+    let wind = Wind::new(WindParameters::default(), 1, None);
+    let (sky, backdrop) = (parameters.at(0.0), SkyBackdrop::new(parameters, 3));
+    let surroundings = Surroundings { sky, ..Surroundings::from_wind(&wind) };
+    let mut strip = Strip::default();
+    strip.reset(Rect::from_size(150, 90), None, 0);
+    backdrop.prepare(&view, &surroundings, &Unobserved).unwrap().draw(&DepthInterval::ALL, &mut strip);
+    (view, sky, strip)
+}
+
+#[test]
+fn the_glow_of_a_town_is_drawn_as_it_lights_the_scene() {
+    let town =
+        TownParameters { population: 30_000.0, azimuth_deg: 10.0, distance_km: 18.0, ..TownParameters::default() };
+    let night = NightParameters { town, ..NightParameters::default() };
+    let (view, sky, strip) = northern_night(SkyParameters { night, ..SkyParameters::default() });
+    let (mut compared, mut brightest) = (0, (0.0_f32, 0.0));
+    for pixel in 0..150 * 90 {
+        let center = DVec2::new((pixel % 150) as f64 + 0.5, (pixel / 150) as f64 + 0.5);
+        let direction = view.camera.direction(center).unwrap().normalize();
+        // The lowest half degree is a pixel high, in which the glow is not linear.
+        if direction.y > 0.01 {
+            let expected = sky.radiance(direction);
+            for c in 0..3 {
+                let ratio = strip.radiance[c][pixel] / expected[c];
+                assert!((ratio - 1.0).abs() < 0.03, "{ratio} at {direction}");
+            }
+            compared += 1;
+            if expected[0] > brightest.0 {
+                brightest = (expected[0], math::atan2(direction.x, -direction.z).to_degrees());
+            }
+        }
+    }
+    assert!(compared > 8000, "{compared}");
+    assert!((brightest.1 - 10.0).abs() < 1.0, "the glow stands at {} degrees", brightest.1);
+}
+
+#[test]
+fn far_mountains_are_lighter_by_night_and_have_their_own_depth() {
+    let parameters = SkyParameters { hills_deg: 14.0, hills_form: HillForm::Mountains, ..SkyParameters::default() };
+    let near = parameters.hills_distance as f32;
+    let (_, _, strip) = northern_night(parameters);
+    let mut means = [[0.0_f64; 2]; 3];
+    for (depth, green) in strip.depth.iter().zip(&strip.radiance[1]) {
+        let range = [1.0, 2.4, 5.0].iter().position(|distance| (depth / (near * distance) - 1.0).abs() < 1e-3);
+        if let Some(range) = range {
+            means[range][0] += f64::from(*green);
+            means[range][1] += 1.0;
+        }
+    }
+    assert!(means.iter().all(|[_, pixels]| *pixels > 50.0), "{means:?}");
+    let [first, second, third] = means.map(|[sum, pixels]| sum / pixels);
+    assert!(second > 1.2 * first && third > 1.2 * second, "{first} {second} {third}");
 }
 
 #[test]

@@ -19,7 +19,7 @@ use super::{
     plate_surface::{PlateSurface, SurfaceInputs},
 };
 use crate::{plan::Plan, plate_boxes::decoded};
-use bansho_scene::{PlateDepth, PlatePictures};
+use bansho_scene::{PlateDepth, PlatePictures, PlateSky};
 
 /// A plate, as large as the picture with its overscan.
 #[derive(Clone, Debug, Default)]
@@ -44,10 +44,14 @@ pub(crate) fn load(plan: &Plan, assets: &dyn Assets, number: i64, camera: &Camer
         return Ok(PlateFrame::default());
     };
     let mapping = PlateMapping::new(plan, [image.color.width(), image.color.height()]);
-    let color = resample_color(plan, &image, alpha, &mapping);
+    let mut color = resample_color(plan, &image, alpha, &mapping);
     let mut depth = plate_depth.as_ref().map(|depth| resample_depth(camera, depth, &mapping));
-    let is_transparent = alpha != PictureAlpha::Opaque;
-    if let Some(depth) = depth.as_mut().filter(|_| is_transparent) {
+    let has_no_sky = plan.scene.plate.sky == PlateSky::Scene;
+    if let Some(depth) = depth.as_ref().filter(|_| has_no_sky) {
+        remove_sky(&mut color, depth);
+    }
+    let is_transparent = alpha != PictureAlpha::Opaque || has_no_sky;
+    if let Some(depth) = depth.as_mut().filter(|_| alpha != PictureAlpha::Opaque) {
         // What is not there hides nothing, whatever depth the file gives it.
         let both = depth.pixels_mut().iter_mut().zip(color.pixels());
         both.filter(|(_, [.., alpha])| *alpha <= 0.0).for_each(|(depth, _)| *depth = [f32::INFINITY]);
@@ -88,6 +92,27 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
         row_over_black(&view, picture.encoding, alpha, row);
     });
     image
+}
+
+/// Makes a plate transparent where its depth is infinite. A pixel is covered as far as it and its neighbors, with binomial weights, have a depth, so that
+/// edges before the sky are as soft as those of a picture.
+fn remove_sky(color: &mut Image<4>, depth: &Image<1>) {
+    const WEIGHTS: [f32; 3] = [0.25, 0.5, 0.25];
+    let (width, height) = (depth.width(), depth.height());
+    color.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let mut coverage = 0.0;
+            for (row_weight, down) in WEIGHTS.iter().zip(0..) {
+                let y = (y + down).saturating_sub(1).min(height - 1);
+                for (column_weight, right) in WEIGHTS.iter().zip(0..) {
+                    let x = (x + right).saturating_sub(1).min(width - 1);
+                    let [depth] = depth.at(x, y);
+                    coverage += if depth.is_finite() && depth > 0.0 { row_weight * column_weight } else { 0.0 };
+                }
+            }
+            *pixel = pixel.map(|value| value * coverage);
+        }
+    });
 }
 
 /// The columns of the picture that the plate covers.
@@ -209,6 +234,23 @@ mod tests {
         // Half white is brighter there than its light alone could be: nothing is covered.
         assert!(coverage_of_encoded_alpha([0.5; 3], 0.5) < 1e-3);
         assert_eq!([0.0, 1.0].map(|alpha| coverage_of_encoded_alpha([0.0; 3], alpha)), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_plate_without_its_sky_has_soft_edges_before_it() {
+        let mut color = Image::filled(6, 5, [0.4, 0.6, 0.8, 1.0]);
+        let mut depth = Image::filled(6, 5, [30.0]);
+        for y in 0..5 {
+            depth.pixels_mut()[6 * y] = [f32::INFINITY];
+            depth.pixels_mut()[6 * y + 1] = [0.0];
+            depth.pixels_mut()[6 * y + 2] = [f32::INFINITY];
+        }
+        remove_sky(&mut color, &depth);
+        for (x, coverage) in [0.0, 0.0, 0.25, 0.75, 1.0, 1.0].into_iter().enumerate() {
+            for y in 0..5 {
+                assert_eq!(color.at(x, y), [0.4, 0.6, 0.8, 1.0].map(|value: f32| value * coverage), "{x} {y}");
+            }
+        }
     }
 
     #[test]

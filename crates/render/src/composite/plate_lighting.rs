@@ -87,7 +87,8 @@ pub fn lit_plate_bytes(compiled: &CompiledScene, plan: &Plan) -> f64 {
     for phenomenon in compiled.phenomena() {
         if phenomenon.info().stepping.is_some() {
             // Before it is simulated, nothing burns: as many as a flame has by default, in two frames.
-            others += 4;
+            let sky_lights = phenomenon.info().sky_lights;
+            others += if sky_lights > 0 { sky_lights } else { 4 };
         } else {
             flames.extend(phenomenon.clone().start().publish(shutter).lights);
         }

@@ -45,6 +45,10 @@ impl Shot {
         }
         for (index, publication) in publications.iter().enumerate() {
             lights.casters.extend_from_slice(&publication.shadow_casters);
+            if !publication.sky_lights.is_empty() {
+                lights.lamps.extend_from_slice(&publication.sky_lights);
+                continue;
+            }
             let mut during_parts = Vec::new();
             if publication.light_parts > 1 {
                 during_parts.extend(parts.iter().map(|(_, during)| during[index].lights.clone()));

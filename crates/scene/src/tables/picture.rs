@@ -1,7 +1,7 @@
 //! The tables `[picture]` and `[plate]`.
 
 use bansho_base::{
-    color::{MAX_EV100, ViewName},
+    color::{self, MAX_EV100, ViewName},
     parameters::{AssetPath, Auto, Kind, Length, Node, Parameter, ProblemKind, Range, Reader, Value},
 };
 
@@ -119,6 +119,13 @@ bansho_base::parameters! {
         fps: FrameRate = FrameRate { frames: 30, seconds: 1 }, unit("1/s");
         /// Exposure value at ISO 100, or "auto": that of the plate; without a plate, measured once for the shot from the luminance of the scene.
         exposure_ev100: Auto<f64> = Auto::Auto, limits(Range::new(-40.0, 40.0)), unit("EV");
+        /// F-number of the camera. With `exposure_time_s` and `iso` it states the exposure in place of `exposure_ev100`: log2(100 f_number^2 / (exposure_time_s iso))
+        /// (ISO 2720). Depth of field is not drawn.
+        f_number: Option<f64> = None, limits(Range::new(0.1, 1000.0));
+        /// Exposure time that, with `f_number` and `iso`, states the exposure. Motion is blurred over `shutter_s` of `[camera]`.
+        exposure_time_s: Option<f64> = None, limits(Range::new(1e-7, 1e6)), unit("s");
+        /// Sensitivity of the camera (ISO), with `f_number` and `exposure_time_s`.
+        iso: Option<f64> = None, limits(Range::new(1.0, 1e7));
         /// View transform of display formats, where the program's user chooses none. A plate that is made for display goes through its inverse, so that its
         /// pixels return unchanged.
         view: ViewName = ViewName::Display;
@@ -133,6 +140,16 @@ bansho_base::parameters! {
     }
 }
 
+impl PictureParameters {
+    /// Keys that together state the exposure by the settings of a camera.
+    pub(crate) const CAMERA_SETTINGS: [&'static str; 3] = ["f_number", "exposure_time_s", "iso"];
+
+    /// The exposure value of the settings of a camera, if all are stated.
+    pub(crate) fn ev100_of_camera(&self) -> Option<f64> {
+        color::ev100_of_camera(self.f_number?, self.exposure_time_s?, self.iso?)
+    }
+}
+
 bansho_base::choice! {
     /// What the depth channel of a plate measures.
     pub enum DepthKind {
@@ -142,6 +159,16 @@ bansho_base::choice! {
         Distance = "distance",
         /// Inverse depth: 1 / distance along the axis.
         Inverse = "inverse",
+    }
+}
+
+bansho_base::choice! {
+    /// What is seen where the depth of a plate is infinite.
+    pub enum PlateSky {
+        /// The image, as it is.
+        Plate = "plate",
+        /// The sky of the scene.
+        Scene = "scene",
     }
 }
 
@@ -184,6 +211,8 @@ bansho_base::parameters! {
         /// Points whose distance along the camera's axis is known, as [x, y, meters], in pixels of the image from its upper left corner. From two or more of them,
         /// scale and shift of an inverse depth are found by least squares.
         depth_known: Vec<[f64; 3]> = Vec::new(), limits(Length { min: 0, max: 1000, item: KNOWN_DEPTH });
+        /// What is seen where the depth is infinite (or 0): the image's own sky, or the sky of the scene in its place. The plate needs a depth.
+        sky: PlateSky = PlateSky::Plate;
         /// Diffuse color of what the image shows: an EXR of linear values, or PNG, JPEG, WebP or TIFF in sRGB, from 0 to 1. With it, the fires and lamps that are drawn
         /// light what the plate shows. The plate needs a depth.
         albedo: Option<AssetPath> = None;

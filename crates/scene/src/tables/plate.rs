@@ -11,7 +11,7 @@ use bansho_base::{
 use super::{
     depth::{self, DepthScale, DepthValues, KnownDepthError},
     ground_fit::{self, PlateView},
-    picture::{DepthKind, PlateAlpha, PlateParameters},
+    picture::{DepthKind, PlateAlpha, PlateParameters, PlateSky},
     plate_checks::{PlateRemark, build_error, check_shape, conflict, file_remarks, size},
     plate_surfaces::PlateSurfaces,
 };
@@ -122,6 +122,10 @@ impl PlateParameters {
         let depth = self.read_depth(assets, frame, &image, view, &mut remarks)?;
         if depth.is_none() && !self.depth_known.is_empty() {
             return Err(conflict("depth_known", KnownDepthError::NoDepth));
+        }
+        if depth.is_none() && self.sky == PlateSky::Scene {
+            let message = "`sky = \"scene\"` needs a depth, from which it is known where the sky is".to_owned();
+            return Err(conflict("sky", message));
         }
         let surfaces = self.read_surfaces(assets, frame, size(&image), depth.is_some(), &mut remarks)?;
         Ok(Some(PlatePictures { image, alpha, depth, surfaces, remarks }))

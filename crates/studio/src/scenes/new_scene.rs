@@ -71,7 +71,7 @@ const AURORA: &str = "\
 bansho = 2
 
 [picture]
-exposure_ev100 = -6.9
+exposure_ev100 = -7.3
 white_balance_k = 4000.0
 
 [camera]
@@ -81,12 +81,13 @@ vertical_fov_deg = 62.0
 
 [sky]
 kind = \"night\"
-hills_deg = 2.0
-trees_deg = 1.1
-night = { airglow = 0.3, stars = 0.6, milky_way = 0.5 }
+hills_deg = 6.0
+hills_form = \"mountains\"
+night = { sun_elevation_deg = -14.5, sun_azimuth_deg = 180.0, airglow = 0.3, stars = 0.6, milky_way = 0.5 }
 
 [[aurora]]
 name = \"aurora\"
+rendering = { color_matching = \"camera\" }
 ";
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use bansho_base::color::{ACESCG_FROM_SRGB, ACESCG_FROM_XYZ, LUMINOUS_EFFICACY_LM_PER_W, Matrix3, line_xyz};
 
-use super::PHOTONS_PER_KILORAYLEIGH;
+use super::{PHOTONS_PER_KILORAYLEIGH, camera::DigitalCamera};
 
 /// Bands of the N2 first positive system in the visible (Vallance Jones 1974, table 4.12): a header, then upper and lower vibrational
 /// level, wavelength in nm, A in 1/s, fraction of the photons of the whole system.
@@ -70,6 +70,9 @@ bansho_base::choice! {
     pub enum ColorMatching {
         /// CIE 1931 standard observer, 2 degrees, straight to the working space.
         Cie1931 = "cie_1931",
+        /// Channels of a digital camera (Nikon D5100, Darrodi et al. 2015), developed for the white balance `camera_white_k`: a purer green and a stronger
+        /// crimson, as in photographs. Luminance is the camera's, not the eye's.
+        Camera = "camera",
         /// The thesis's table 2.1, which has its five lines only, and its matrix (2.30) to sRGB.
         Table21 = "table_2_1",
     }
@@ -112,11 +115,12 @@ impl LineSet {
 }
 
 impl ColorMatching {
-    /// Absolute ACEScg color per kilorayleigh of a line, luminance in cd/m^2.
+    /// Absolute ACEScg color per kilorayleigh of a line, luminance in cd/m^2. A camera's colors are those of `camera`.
     #[must_use]
-    pub(crate) fn line_color(self, wavelength_nm: f64) -> [f64; 3] {
+    pub(crate) fn line_color(self, camera: &DigitalCamera, wavelength_nm: f64) -> [f64; 3] {
         match self {
             Self::Cie1931 => ACESCG_FROM_XYZ.apply(absolute_xyz(wavelength_nm)),
+            Self::Camera => camera.line_color(wavelength_nm, watts_per_kilorayleigh(wavelength_nm)),
             Self::Table21 => table_2_1_acescg(wavelength_nm, watts_per_kilorayleigh(wavelength_nm)),
         }
     }
@@ -227,7 +231,8 @@ mod tests {
             let number = |column: usize| fields[column].parse::<f64>().unwrap();
             if fields[2] == "CIE1931_2deg" && !fields[0].contains("composite") {
                 let line = LINES.iter().find(|line| (line.wavelength_nm - number(1)).abs() < 0.02).unwrap();
-                let found = luminance_of(ColorMatching::Cie1931.line_color(line.wavelength_nm));
+                let found =
+                    luminance_of(ColorMatching::Cie1931.line_color(&DigitalCamera::new(6500.0), line.wavelength_nm));
                 assert!((found / number(19) - 1.0).abs() < 0.01, "{row}: {found}");
                 compared += 1;
             }

@@ -42,25 +42,30 @@ const NITROGEN_A_BY_O2: f64 = 4.1e-18;
 
 /// Fractions of the ion pairs by species.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct IonizationFractions {
-    n2: f64,
+pub(super) struct IonizationFractions {
+    pub(super) n2: f64,
     o2: f64,
     o: f64,
 }
 
 /// Weights 0.92, 1 and 0.56 of Rees (1989).
-fn ionization_fractions(air: &AirLevel) -> IonizationFractions {
+pub(super) fn ionization_fractions(air: &AirLevel) -> IonizationFractions {
     let (n2, o2, o) = (0.92 * air.n2, air.o2, 0.56 * air.o);
     let sum = n2 + o2 + o;
     IonizationFractions { n2: n2 / sum, o2: o2 / sum, o: o / sum }
+}
+
+/// Rates at which an N2+ ion gives its charge to O2, and reacts with O, 1/s (Lindinger et al. 1974; McFarland et al. 1973).
+pub(super) fn n2_ion_charge_transfer_per_s(air: &AirLevel) -> [f64; 2] {
+    let cold = 300.0 / air.temperature;
+    [5e-17 * math::pow(cold, 0.8) * air.o2, 1.4e-16 * math::pow(cold, 0.44) * air.o]
 }
 
 /// Fraction of the ion pairs that become O2+: N2+ and O+ transfer their charge to O2 or form NO+ (rates of Lindinger et
 /// al. 1974 and McFarland et al. 1973). It increases downward with the density of O2.
 fn o2_ion_fraction(air: &AirLevel, ionization_fractions: &IonizationFractions) -> f64 {
     let cold = 300.0 / air.temperature;
-    let n2_by_o2 = 5e-17 * math::pow(cold, 0.8) * air.o2;
-    let n2_by_o = 1.4e-16 * math::pow(cold, 0.44) * air.o;
+    let [n2_by_o2, n2_by_o] = n2_ion_charge_transfer_per_s(air);
     let o_by_o2 = 2e-17 * math::sqrt(cold) * air.o2;
     let o_by_n2 = 1.2e-18 * air.n2;
     ionization_fractions.o2

@@ -1,18 +1,22 @@
 //! Emission of excited atoms and molecules: photons, lifetime, diffusion and color.
 //!
-//! [`emitter`] lists the excited states, their lines and their colors. [`excitation`] has the photons per ion pair, as measured and by the rules of the
-//! thesis; [`quenching`] which fraction of them is radiated, how late and how far away. [`Emission`] is the table that follows: photons of each emitter
-//! by electron energy and altitude for a spectrum. [`extinction`](crate::physics::extinction) is the lower atmosphere.
-//! [`calibration`](super::calibration) compares all of it with observations.
+//! [`emitter`] lists the excited states, their lines and their colors, and `camera` has how a camera records these. [`excitation`] has the photons per
+//! ion pair, as measured and by the rules of the thesis; [`quenching`] which fraction of them is radiated, how late and how far away;
+//! `resonant_scattering` the sunlight that ions scatter. [`Emission`] is the table that follows: photons of each emitter by electron energy and altitude
+//! for a spectrum. [`extinction`](crate::physics::extinction) is the lower atmosphere. [`calibration`](super::calibration) compares all of it with
+//! observations.
 
+pub(crate) mod camera;
 pub mod emitter;
 pub mod excitation;
 pub mod quenching;
+mod resonant_scattering;
 
 use bansho_base::math::lerp;
 pub use emitter::{ColorMatching, EMITTERS, LINES, Line, LineSet, PerEmitter, SpectralEmitter};
 use excitation::{mean_hard_sphere_photons, photons_per_ion_pair};
 use quenching::{LifetimeAndDiffusion, RED_ALTITUDES, mean_lifetimes};
+use resonant_scattering::scattered_photons_per_ion_pair;
 
 use super::{
     atmosphere::{Atmosphere, LEVEL_SPACING, LEVELS, covers, locate_level},
@@ -61,6 +65,16 @@ impl Emission {
         let photons = air.levels().iter().map(photons_per_ion_pair).collect();
         let spread = SpreadByEnergy::of_fang_2010();
         Self::from_photons(air, Deposition::new(air, spectrum), LineSet::Observed, spread, photons)
+    }
+
+    /// The same table where the sun shines above an altitude: N2+ scatters its light there.
+    #[must_use]
+    pub fn sunlit_above(self, air: &Atmosphere, altitude_km: f64) -> Self {
+        let Self { deposition, lines, spread, mut photons, .. } = self;
+        for (level, (photons, air)) in photons.iter_mut().zip(air.levels()).enumerate() {
+            photons[SpectralEmitter::NitrogenIon.index()] += scattered_photons_per_ion_pair(level, air, altitude_km);
+        }
+        Self::from_photons(air, deposition, lines, spread, photons)
     }
 
     /// The table for the thesis's hard-sphere tracks and its rules of emission.

@@ -13,6 +13,7 @@ use source_bins::{FieldLineSource, REACH};
 
 use super::{
     Blur, RenderingParameters, Sampling,
+    diffuse::DiffuseAurora,
     project::field_lines::{FieldLines, FootPoint},
 };
 use crate::{
@@ -49,11 +50,15 @@ pub(crate) struct Sources {
     pub(crate) soft: Vec<FieldLineSource>,
     /// Standard deviations of both, km.
     pub(crate) spread_km: [f64; 2],
+    /// The diffuse aurora, and the standard deviation of its cells, km.
+    pub(crate) diffuse: Vec<FieldLineSource>,
+    pub(crate) diffuse_spread_km: f64,
 }
 
 /// Weights of green, red and prompt light; for the soft chart, of the three red altitudes.
 pub(crate) type EmitterWeights = [f32; 3];
 const GREEN: [EmitterWeights; 1] = [[1.0, 0.0, 0.0]];
+const ALL: [EmitterWeights; 1] = [[1.0, 1.0, 1.0]];
 const RED: [EmitterWeights; RED_ALTITUDES] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Converts particles and cells to sources.
@@ -66,6 +71,13 @@ pub(crate) struct SourceBuilder<'a> {
     pub(crate) instant: u32,
     /// Attenuation by the distance of the field line.
     pub(crate) attenuation: AttenuationByDistance,
+}
+
+impl<'a> SourceBuilder<'a> {
+    /// Sources of full power at an instant, with that standard deviation, km.
+    fn new(inputs: &EmissionInputs, field: &'a FieldLines, instant: u32, spread_km: f64) -> Self {
+        Self { field, reach: spread_km as f32 * REACH, weight: 1.0, instant, attenuation: inputs.attenuation }
+    }
 }
 
 impl SourceBuilder<'_> {
@@ -184,10 +196,16 @@ struct LastingLight<'a> {
 impl Sources {
     /// Sources while the shutter is open.
     pub(crate) fn new(inputs: &EmissionInputs, field: &FieldLines, times: &SampleTimes) -> Self {
-        match inputs.afterglow {
+        let mut sources = match inputs.afterglow {
             Some(afterglow) => Self::with_afterglow(inputs, afterglow, field, times),
             None => Self::without_afterglow(inputs, field, times),
-        }
+        };
+        // It hardly moves during an exposure, and its light is as steady as its electrons.
+        let spread_km = inputs.diffuse.cell_spread_km();
+        let builder = SourceBuilder::new(inputs, field, times.first_index, spread_km);
+        sources.diffuse = builder.cells(&inputs.diffuse.cells(inputs.particles, inputs.time), ALL);
+        sources.diffuse_spread_km = spread_km;
+        sources
     }
 
     /// All light is emitted where and when electrons strike, as in the thesis.
@@ -200,7 +218,7 @@ impl Sources {
             let builder = SourceBuilder { field, reach, weight, instant, attenuation: inputs.attenuation };
             sharp.extend(builder.particles(inputs.particles, lasting, *offset_s as f32));
         }
-        Self { sharp, soft: Vec::new(), spread_km: [spread; 2] }
+        Self { sharp, spread_km: [spread; 2], ..Self::default() }
     }
 
     fn with_afterglow(inputs: &EmissionInputs, afterglow: &Afterglow, field: &FieldLines, times: &SampleTimes) -> Self {
@@ -221,13 +239,7 @@ impl Sources {
         );
         let green_spread = block_spread_km(cell_spreads[0], afterglow.green.cell_km(), blocks[0]);
         let red_spread = block_spread_km(cell_spreads[1], afterglow.red.cell_km(), blocks[1]);
-        let builder = SourceBuilder {
-            field,
-            reach: spread as f32 * REACH,
-            weight: 1.0,
-            instant: times.first_index,
-            attenuation: inputs.attenuation,
-        };
+        let builder = SourceBuilder::new(inputs, field, times.first_index, spread);
         let lasting = LastingLight { green_w: &green_w, red_fraction: 0.0 };
         let mut sharp = SourceBuilder { reach: green_spread as f32 * REACH, ..builder }.cells(&green, GREEN);
         let weight = 1.0 / times.offsets_s.len().max(1) as f32;
@@ -237,7 +249,7 @@ impl Sources {
         }
         // Red light is spread over kilometers, so that a coarser chart holds all of it.
         let soft = SourceBuilder { reach: red_spread as f32 * REACH, ..builder }.cells(&red, RED);
-        Self { sharp, soft, spread_km: [spread, red_spread] }
+        Self { sharp, soft, spread_km: [spread, red_spread], ..Self::default() }
     }
 }
 
@@ -245,7 +257,10 @@ impl Sources {
     /// Appends other sources with their power scaled by a weight.
     pub(crate) fn add(&mut self, others: &Self, weight: f32) {
         let first = self.sharp.is_empty() && self.soft.is_empty();
-        for (sum, others) in [(&mut self.sharp, &others.sharp), (&mut self.soft, &others.soft)] {
+        self.diffuse_spread_km = others.diffuse_spread_km;
+        let pairs =
+            [(&mut self.sharp, &others.sharp), (&mut self.soft, &others.soft), (&mut self.diffuse, &others.diffuse)];
+        for (sum, others) in pairs {
             for source in others {
                 sum.push(FieldLineSource { power: source.power.map(|power| weight * power), ..*source });
             }
@@ -271,6 +286,9 @@ pub(crate) struct EmissionInputs<'a> {
     pub(crate) particles: &'a AuroraParticles,
     /// The green and the red map, unless all light is prompt.
     pub(crate) afterglow: Option<&'a Afterglow>,
+    /// The diffuse aurora, and the time at which it is drawn, s.
+    pub(crate) diffuse: &'a DiffuseAurora,
+    pub(crate) time: f64,
     pub(crate) emission: &'a Emission,
     pub(crate) parameters: &'a RenderingParameters,
     /// Mean distance between neighboring particles, km.

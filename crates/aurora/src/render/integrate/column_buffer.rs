@@ -43,6 +43,21 @@ impl ColumnBuffer {
         }
     }
 
+    /// Adds the light of a buffer with the same chart.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let rows = self.chart.rows;
+        let columns = self.light.par_chunks_mut(rows).zip(&mut self.valid_rows);
+        columns.zip(other.light.par_chunks(rows).zip(&other.valid_rows)).for_each(
+            |((light, valid), (added, range))| {
+                let [first, end] = range.map(|row| row as usize);
+                for (sum, value) in light[first.min(end)..end].iter_mut().zip(&added[first.min(end)..end]) {
+                    *sum = std::array::from_fn(|emitter| sum[emitter] + value[emitter]);
+                }
+                *valid = [valid[0].min(range[0]), valid[1].max(range[1])];
+            },
+        );
+    }
+
     /// The chart, and the buffer in blocks of that many columns, each for one thread.
     pub(crate) fn blocks(&mut self, columns: usize) -> (&Chart, impl IndexedParallelIterator<Item = ColumnBlock<'_>>) {
         let light = self.light.par_chunks_mut(columns * self.chart.rows);

@@ -76,7 +76,7 @@ fn arc_drawn(drawing: &RenderingParameters, seed: u64, particles: usize) -> ([f6
 
 /// The mean of pictures of collisions of an arc, and the picture of the mean profile.
 fn arc_pictures(drawing: &RenderingParameters, seed: u64, particles: usize) -> (Vec<PerEmitter<f32>>, ColumnBuffer) {
-    let emission = drawing.emission(SpectrumShape::Gaussian);
+    let emission = drawing.emission(SpectrumShape::Gaussian, None);
     let collisions = CollisionRenderer::new(
         &emission,
         drawing,

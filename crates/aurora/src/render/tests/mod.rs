@@ -405,7 +405,7 @@ fn far_and_near_arcs_are_smooth_up_and_down() {
             let spread_km = [6.0, 15.0];
             let of = |shares, spread_km| sources(&cells, shares, spread_km, &field);
             let sharp = [of(GREEN, 6.0), of(PROMPT, 6.0)].concat();
-            let sources = Sources { sharp, soft: of(SOFT, 15.0), spread_km };
+            let sources = Sources { sharp, soft: of(SOFT, 15.0), spread_km, ..Sources::default() };
             let charts =
                 ChartBuilder { inputs: run.render_inputs(), field: &field, coverage: Coverage::of_view(&view, &field) };
             let charts = [charts.sharp(&sources), charts.soft(&sources)];

@@ -4,3 +4,4 @@ pub(crate) mod arc_length;
 pub(crate) mod nodes;
 pub(crate) mod rays;
 pub(crate) mod refined_shape;
+mod swirls;

@@ -5,15 +5,15 @@ use bansho_base::{
         approximations,
         random::{Key, Purpose},
     },
-    noise::{Coordinate, Fractal, LANES, Noise, VARIANCE},
+    noise::{Coordinate, Fractal, LANES, MAX_OCTAVES, Noise},
 };
 use fearless_simd::{Level, dispatch};
 
 use super::nodes::split;
 use crate::{AuroraParameters, PulsationParameters, RayParameters};
 
-/// Fractal noise of the rays: its octaves are groups of rays, rays, and fine structure.
-const RAYS: Fractal = Fractal { octaves: 3, lacunarity: 2, gain: 0.7 };
+/// Octaves of a group of four rays: the group, pairs and rays.
+const GROUP_OCTAVES: u32 = 3;
 /// Table nodes per cell of the finest octave: linear interpolation is then accurate to a hundredth.
 const NODES_PER_CELL: f64 = 12.0;
 /// Maximum table nodes per particle: finer rays are not resolved by particles.
@@ -35,6 +35,10 @@ pub(crate) struct RayPattern {
     patches: Noise<2>,
     /// Standard deviation of the noise, for normalization.
     deviation: f32,
+    /// Length of a cell of the coarsest octave.
+    coarsest_km: f64,
+    /// Lifetime of its values.
+    coarsest_lifetime_s: f64,
     max_nodes: f64,
 }
 
@@ -69,19 +73,19 @@ pub(crate) struct PatternSample {
 impl RayPattern {
     pub(crate) fn new(parameters: &AuroraParameters, key: Key) -> Self {
         let [a, b, c, d] = key.words(0, 0, Purpose::named("aurora rays"));
-        let [mut sum, mut squares, mut amplitude] = [0.0, 0.0, 1.0_f64];
-        for _ in 0..RAYS.octaves {
-            sum += amplitude;
-            squares += amplitude * amplitude;
-            amplitude *= f64::from(RAYS.gain);
-        }
+        let fractal = ray_octaves(&parameters.rays);
+        // The finest octave has a cell for each ray; times scale as lengths do.
+        let coarsest_cells = f64::from(1_u32 << (fractal.octaves - 1));
+        let groups = coarsest_cells / f64::from(1_u32 << (GROUP_OCTAVES - 1));
         Self {
             rays: parameters.rays.clone(),
             pulsation: parameters.pulsation.clone(),
-            noise: [pattern_noise(a, RAYS), pattern_noise(b, RAYS)],
+            noise: [pattern_noise(a, fractal), pattern_noise(b, fractal)],
             black: pattern_noise(c, Fractal::SINGLE),
             patches: pattern_noise(d, Fractal::SINGLE),
-            deviation: ((VARIANCE[0] * squares).sqrt() / sum) as f32,
+            deviation: fractal.standard_deviation(2) as f32,
+            coarsest_km: coarsest_cells * parameters.rays.spacing_km,
+            coarsest_lifetime_s: groups * parameters.rays.lifetime_s,
             max_nodes: NODES_PER_PARTICLE * parameters.particles.count as f64,
         }
     }
@@ -136,10 +140,7 @@ impl RayPattern {
         let mut sample = PatternSample { brightness: [1.0; LANES], dimming: [1.0; LANES], hardness: [1.0; LANES] };
         for i in 0..LANES {
             let [left, right, black, patch] = coordinates.noises[i];
-            let fraction = (0.5 + 0.5 * coordinates.side[i]).clamp(0.0, 1.0);
-            // A blend of two independent patterns has less variance than one; normalized.
-            let variance = fraction * fraction + (1.0 - fraction) * (1.0 - fraction);
-            let mixed = (left + fraction * (right - left)) / (self.deviation * variance.sqrt());
+            let mixed = self.mixed([left, right], coordinates.side[i]);
             sample.brightness[i] = approximations::exp(self.rays.contrast as f32 * mixed);
             sample.hardness[i] = approximations::exp(self.rays.energy_variation as f32 * mixed);
             sample.dimming[i] = self.darkness(black) * self.pulse(patch, time);
@@ -147,16 +148,42 @@ impl RayPattern {
         sample
     }
 
+    /// The noise at a lateral position, -1 to 1, with a standard deviation of 1.
+    #[inline(always)]
+    fn mixed(&self, [left, right]: [f32; 2], side: f32) -> f32 {
+        let fraction = (0.5 + 0.5 * side).clamp(0.0, 1.0);
+        // A blend of two independent patterns has less variance than one; normalized.
+        let variance = fraction * fraction + (1.0 - fraction) * (1.0 - fraction);
+        (left + fraction * (right - left)) / (self.deviation * variance.sqrt())
+    }
+
+    /// Mean power factor of the rays across a sheet, over a part of its length.
+    pub(crate) fn mean_brightness(&self, table: &RayTable, sheet: usize, [from, to]: [f64; 2]) -> f64 {
+        if self.rays.contrast <= 0.0 {
+            return 1.0;
+        }
+        let nodes = &table.sheets[sheet];
+        let last = (nodes.len() - 1) as f64;
+        let [first, end] = [(from * last).round(), (to * last).round()].map(|node| node.clamp(0.0, last) as usize);
+        let mut sum = 0.0;
+        for [left, right, ..] in &nodes[first..=end.max(first)] {
+            for (side, weight) in [(-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)] {
+                sum += weight * approximations::exp(self.rays.contrast as f32 * self.mixed([*left, *right], side));
+            }
+        }
+        f64::from(sum) / (end.max(first) - first + 1) as f64
+    }
+
     /// Noise of the rays on both sides, of black rays and of patches; 0 for disabled patterns.
     fn noises(&self, level: Level, coordinates: &[f64; LANES], time: f64) -> [[f32; LANES]; 4] {
         let rays = &self.rays;
-        let (shift, age) = (rays.shear_km_per_s * time, time / rays.lifetime_s);
-        // Groups of rays are four rays long. Black rays drift against the rays of one side.
-        let [group, black, patch] = [4.0 * rays.spacing_km, rays.black_ray_spacing_km, self.pulsation.patch_length_km];
+        let (shift, age) = (rays.shear_km_per_s * time, time / self.coarsest_lifetime_s);
+        // Black rays drift against the rays of one side.
+        let [black, patch] = [rays.black_ray_spacing_km, self.pulsation.patch_length_km];
         let channels = [
-            (rays.contrast.max(rays.energy_variation), &self.noise[0], shift, group, age),
-            (rays.contrast.max(rays.energy_variation), &self.noise[1], -shift, group, age),
-            (rays.black_ray_depth, &self.black, -shift, black, age),
+            (rays.contrast.max(rays.energy_variation), &self.noise[0], shift, self.coarsest_km, age),
+            (rays.contrast.max(rays.energy_variation), &self.noise[1], -shift, self.coarsest_km, age),
+            (rays.black_ray_depth, &self.black, -shift, black, time / rays.lifetime_s),
             (self.pulsation.modulation_depth, &self.patches, 0.0, patch, 0.0),
         ];
         channels.map(|(strength, noise, shift, scale, age)| {
@@ -183,6 +210,15 @@ impl RayPattern {
         let dark = 0.5 - 0.5 * approximations::cos_turns(turns + 2.0 * noise);
         1.0 - self.pulsation.modulation_depth as f32 * dark
     }
+}
+
+/// Octaves from the outer scale down to single rays.
+fn ray_octaves(rays: &RayParameters) -> Fractal {
+    let mut octaves = 1;
+    while octaves < MAX_OCTAVES && f64::from(1_u32 << octaves) * rays.spacing_km < 1.5 * rays.outer_scale_km {
+        octaves += 1;
+    }
+    Fractal { octaves, lacunarity: 2, gain: rays.octave_gain as f32 }
 }
 
 /// Noise of a pattern along the sheets and in time.

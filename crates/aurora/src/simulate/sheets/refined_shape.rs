@@ -1,11 +1,14 @@
-//! The refined in-between shape: a smooth curve through the control points, with folds that travel along it.
+//! The refined in-between shape: a smooth curve through the control points, wound by swirls, with folds that travel along it.
 
 use bansho_base::{
     math::{DVec2, lerp, random::Key},
     noise::{Coordinate, Fractal, Noise},
 };
 
-use super::arc_length::{ArcLengthMap, ArcPosition};
+use super::{
+    arc_length::{ArcLengthMap, ArcPosition},
+    swirls::Swirls,
+};
 use crate::{
     AuroraParameters, FoldParameters,
     shapes::{Bridge, NearestSegmentGrid, Shape, Sheet, SheetEnd, SheetSampler, cumulative_lengths, line_length},
@@ -30,6 +33,7 @@ const SWING: f64 = 2.0;
 pub(crate) struct FoldModel {
     parameters: FoldParameters,
     noise: Noise<2>,
+    swirls: Option<Swirls>,
     piece_km: f64,
     max_pieces: f64,
     half_km: f64,
@@ -46,7 +50,8 @@ impl FoldModel {
         // Detail finer than a fraction of the thickness is not visible.
         let piece_km = fold.min(aurora.cell_km()).max(aurora.half_thickness_km() / PIECES_PER_THICKNESS);
         let max_pieces = (PIECES_PER_PARTICLE * aurora.particles.count as f64).clamp(MIN_MAX_SEGMENTS, MAX_SEGMENTS);
-        Self { noise, piece_km, max_pieces, half_km: aurora.extent_km / 2.0, parameters }
+        let swirls = Swirls::new(aurora, key);
+        Self { noise, swirls, piece_km, max_pieces, half_km: aurora.extent_km / 2.0, parameters }
     }
 
     /// Lateral displacement of the sheet at a coordinate and a time, km.
@@ -122,6 +127,9 @@ impl RefinedShape {
         let (mut fine, mut arc_positions) = (Shape::default(), Vec::new());
         for (index, sheet) in shape.sheets.iter().enumerate() {
             let (mut refined, positions) = refine(sheet, piece, |point, t| arc_map.interpolate(index, point, t));
+            if let Some(swirls) = &folds.swirls {
+                wind(&mut refined, swirls, folds.half_km, time);
+            }
             if folds.parameters.amplitude_km > 0.0 {
                 fold(&mut refined, &positions, folds, time);
             }
@@ -369,6 +377,13 @@ fn hermite([a, b]: [DVec2; 2], [at_a, at_b]: [DVec2; 2], t: f64) -> DVec2 {
     let rest_squared = rest * rest;
     a * (rest_squared * (1.0 + 2.0 * t)) + b * (t_squared * (3.0 - 2.0 * t)) + at_a * (t * rest_squared)
         - at_b * (t_squared * rest)
+}
+
+/// Carries every point by the flow of the swirls.
+fn wind(sheet: &mut Sheet, swirls: &Swirls, half_km: f64, time: f64) {
+    let half = DVec2::splat(half_km);
+    swirls.carry_all(&mut sheet.points, time);
+    sheet.points.iter_mut().for_each(|point| *point = point.clamp(-half, half));
 }
 
 /// Displaces every point laterally, and along the sheet so that crests lean over, relative to the coordinate's

@@ -43,6 +43,7 @@ fn literal(cells: f64, kernel: RepulsionKernel) -> AuroraParameters {
         },
         rays: RayParameters { contrast: 0.0, energy_variation: 0.0, ..RayParameters::default() },
         folds: FoldParameters { amplitude_km: 0.0, ..FoldParameters::default() },
+        swirls: SwirlParameters { displacement_km: 0.0, ..SwirlParameters::default() },
         ..AuroraParameters::default()
     }
 }

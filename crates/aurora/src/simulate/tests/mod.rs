@@ -10,16 +10,17 @@ use bansho_base::{host::assets::MemoryAssets, math::DVec2, parameters::Auto};
 
 use super::AuroraSimulation;
 use crate::{
-    AuroraParameters, FieldParameters, FoldParameters, ParticleParameters,
+    AuroraParameters, FieldParameters, FoldParameters, ParticleParameters, SwirlParameters,
     shapes::{Form, MergeParameters, Sequence, Shape, ShapeParameters, SheetParameters, SplitParameters},
 };
 
-/// Few particles on a coarse grid, without folds.
+/// Few particles on a coarse grid, without folds and swirls.
 fn small() -> AuroraParameters {
     AuroraParameters {
         field: FieldParameters { cells: 127, ..FieldParameters::default() },
         particles: ParticleParameters { count: 12_000, ..ParticleParameters::default() },
         folds: FoldParameters { amplitude_km: 0.0, ..FoldParameters::default() },
+        swirls: SwirlParameters { displacement_km: 0.0, ..SwirlParameters::default() },
         ..AuroraParameters::default()
     }
 }

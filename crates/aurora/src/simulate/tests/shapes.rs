@@ -285,6 +285,7 @@ fn what_is_found_along_the_sheets_is_bounded_by_the_particles_not_by_the_drawn_s
         let mut parameters =
             AuroraParameters { shapes: vec![shape((0..rows).map(sheet).collect())], ..AuroraParameters::default() };
         parameters.particles.count = particles;
+        parameters.swirls.displacement_km = 0.0;
         let refined = simulation(parameters).refined_shape();
         let lengths = refined.sheet_lengths().iter().sum::<f64>();
         let spacing = AuroraParameters::default().cell_km();

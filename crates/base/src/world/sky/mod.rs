@@ -2,6 +2,7 @@
 
 mod elevations;
 mod night;
+mod town;
 
 use std::f64::consts::PI;
 
@@ -14,6 +15,7 @@ use crate::{
 
 pub use elevations::{ElevationProfile, ElevationSample};
 pub use night::{Almucantar, EARTH_RADIUS_KM, Night, SkyObserver, twilight_luminance};
+pub use town::TownGlow;
 
 /// Air masses along a line of sight `elevation` radians above the horizon: 1 overhead, 38 at the horizon (Kasten & Young 1989). Below
 /// the horizon it is that of the horizon.
@@ -153,7 +155,7 @@ mod tests {
     use crate::color::luminance;
 
     fn sky(kind: SkyKind) -> Sky {
-        let night = Night { airglow: 1.0, twilight: 0.0, sunward: -DVec3::Z, extinction: 0.22 };
+        let night = Night { airglow: 1.0, twilight: 0.0, sunward: -DVec3::Z, extinction: 0.22, town: None };
         if kind == SkyKind::Night { Sky::from_night(night) } else { Sky::new(kind, 900.0, 7000.0) }
     }
 

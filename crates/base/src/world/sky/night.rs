@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::air_mass;
+use super::{TownGlow, air_mass};
 use crate::{
     color::{ACESCG_FROM_XYZ, LUMINOUS_EFFICACY_LM_PER_W, black_body, line_xyz, luminance},
     math,
@@ -90,6 +90,8 @@ pub struct Night {
     pub sunward: DVec3,
     /// Atmospheric extinction overhead, magnitudes.
     pub extinction: f64,
+    /// The glow of a town.
+    pub town: Option<TownGlow>,
 }
 
 /// Luminance of the twilight overhead, cd/m^2, at an elevation of the sun in degrees, 0 or below (Koomen et al. 1952).
@@ -135,7 +137,25 @@ impl Night {
     /// Radiance from a direction above the horizon (ACEScg, cd/m^2).
     pub(super) fn radiance(&self, direction: DVec3) -> [f32; 3] {
         let elevation = math::asin(direction.y.clamp(0.0, 1.0));
-        self.almucantar(elevation).radiance(self.sunwardness(direction) as f32)
+        let natural = self.almucantar(elevation).radiance(self.sunwardness(direction) as f32);
+        let Some(town) = &self.town else { return natural };
+        let horizontal = DVec3::new(direction.x, 0.0, direction.z).normalize_or_zero();
+        let glow = town.luminance(elevation, horizontal.dot(town.toward)) as f32;
+        let color = self.town_color();
+        std::array::from_fn(|c| natural[c] + glow * color[c])
+    }
+
+    /// Color of the town's glow (ACEScg, luminance 1); black without a town.
+    #[must_use]
+    pub fn town_color(&self) -> [f32; 3] {
+        let color = self.town.map(|town| blackbody_light(town.temperature_k as f32, 1.0));
+        color.unwrap_or_default().as_vec3().to_array()
+    }
+
+    /// Horizontal unit vector toward the town; 0 without a town.
+    #[must_use]
+    pub fn townward(&self) -> DVec3 {
+        self.town.map_or(DVec3::ZERO, |town| town.toward)
     }
 
     /// Horizontal unit vector toward the azimuth of the sun.
@@ -159,7 +179,8 @@ impl Night {
     #[must_use]
     pub fn above(&self, observer: SkyObserver) -> Self {
         let air = observer.air_above();
-        Self { extinction: self.extinction * air, twilight: self.twilight * air, ..*self }
+        let town = self.town.map(|town| town.dimmed(air));
+        Self { extinction: self.extinction * air, twilight: self.twilight * air, town, ..*self }
     }
 
     /// The almucantar of an elevation in radians, seen from the ground.
@@ -208,7 +229,8 @@ mod tests {
 
     /// A typical night, with the sun in the north.
     fn night(sun_elevation_deg: f64) -> Night {
-        Night { airglow: 1.0, twilight: twilight_luminance(sun_elevation_deg), sunward: -DVec3::Z, extinction: 0.22 }
+        let twilight = twilight_luminance(sun_elevation_deg);
+        Night { airglow: 1.0, twilight, sunward: -DVec3::Z, extinction: 0.22, town: None }
     }
 
     fn overhead(night: &Night) -> f64 {

@@ -52,7 +52,7 @@ fn particles_are_written_a_file_a_frame() {
 #[test]
 fn an_auroras_electrons_lie_on_the_shell_at_100_km() {
     let folder = Folder::with_scene(
-        "bansho = 2\n[[aurora]]\npreroll_s = 0.2\nflux_mw_per_m2 = 20\nenergy_ev = 3000\nparticles = { count = 2000 }\n",
+        "bansho = 2\n[[aurora]]\npreroll_s = 0.2\nflux_mw_per_m2 = 20\nenergy_ev = 3000\nswirls = { displacement_km = 0 }\nparticles = { count = 2000 }\n",
     );
     folder.succeed(&["simulate", "scene.toml", "--particles", "aurora.ply", "--frames", "3"]);
     let (names, rows) = read_ply(&folder.files("")["aurora.ply"]);
