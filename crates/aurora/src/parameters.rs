@@ -221,6 +221,13 @@ bansho_base::parameters! {
         lifetime_s: f64 = 3.0, limits(Range::new(0.01, 1e5)), unit("s");
         /// Variation of the electron energy with the rays: bright rays reach lower altitudes. The standard deviation of its logarithm.
         energy_variation: f64 = 0.15, limits(Range::new(0.0, 2.0));
+        /// Variation of brightness and energy across the thickness of the sheet, as a factor of `contrast` and `energy_variation`: a fold that is seen along
+        /// the sheet is several rays instead of one bar.
+        filament_contrast: f64 = 1.5, limits(Range::new(0.0, 5.0));
+        /// Distance between filaments across the sheet.
+        filament_spacing_km: f64 = 2.5, limits(Range::new(0.05, 1000.0)), unit("km");
+        /// Length of filaments along the sheet.
+        filament_length_km: f64 = 20.0, limits(Range::new(0.05, 10_000.0)), unit("km");
         /// Depth of black rays, thin dark gaps that travel along the sheet.
         black_ray_depth: f64 = 0.0, limits(FRACTION);
         /// Distance between black rays.

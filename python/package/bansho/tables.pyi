@@ -899,7 +899,8 @@ class Aurora(SceneTable):
     rays:
         Rays: fine bright and dark streaks along a sheet. Allowed: a table. Default: {'contrast': 0.6, 'spacing_km':
         2.5, 'outer_scale_km': 80.0, 'octave_gain': 0.6, 'shear_km_per_s': 1.5, 'lifetime_s': 3.0, 'energy_variation':
-        0.15, 'black_ray_depth': 0.0, 'black_ray_spacing_km': 8.0}.
+        0.15, 'filament_contrast': 1.5, 'filament_spacing_km': 2.5, 'filament_length_km': 20.0, 'black_ray_depth': 0.0,
+        'black_ray_spacing_km': 8.0}.
     folds:
         Folds that travel along a sheet. Allowed: a table. Default: {'amplitude_km': 3.0, 'wavelength_km': 40.0,
         'speed_km_per_s': 2.0, 'lifetime_s': 8.0, 'curl': 0.3}.

@@ -7,6 +7,7 @@ use crate::{
     AuroraParameters, PowerDistribution,
     physics::precipitation::energy_grid::{HIGHEST_EV, LOWEST_EV},
     simulate::sheets::{
+        filaments::{FilamentInputs, FilamentPattern},
         nodes::{NodeLayout, NodeValues},
         rays::{PatternInputs, RayPattern, RayTable},
         refined_shape::{RefinedShape, SheetProjection},
@@ -41,6 +42,7 @@ const W_PER_KM2: f64 = 1e3;
 pub(super) struct EnergyFlux {
     parameters: AuroraParameters,
     rays: RayPattern,
+    filaments: Option<FilamentPattern>,
 }
 
 /// The particles of one task.
@@ -56,7 +58,8 @@ struct ParticleChunk<'a> {
 
 impl EnergyFlux {
     pub(super) fn new(parameters: &AuroraParameters, key: Key) -> Self {
-        Self { parameters: parameters.clone(), rays: RayPattern::new(parameters, key) }
+        let (rays, filaments) = (RayPattern::new(parameters, key), FilamentPattern::new(parameters, key));
+        Self { parameters: parameters.clone(), rays, filaments }
     }
 
     /// Layouts of the coarse and the fine intervals for sheets of these lengths.
@@ -185,7 +188,14 @@ impl EnergyFlux {
                 projections[lane] = Some(projection);
             }
             // Projections are scalar, since each particle has its own list of segments; the pattern, which is noise, is computed for sixteen.
-            let pattern = self.rays.at(level, &inputs, time);
+            let mut pattern = self.rays.at(level, &inputs, time);
+            if let Some(filaments) = &self.filaments {
+                let sample = filaments.at(level, &filament_inputs(&projections, rays), time);
+                for lane in 0..LANES {
+                    pattern.brightness[lane] *= sample.brightness[lane];
+                    pattern.hardness[lane] *= sample.hardness[lane];
+                }
+            }
             for (lane, projection) in projections.into_iter().enumerate().take(count) {
                 let index = first + lane;
                 let Some(projection) = projection else {
@@ -205,6 +215,19 @@ impl EnergyFlux {
         }
         weighted
     }
+}
+
+/// Where sixteen particles are on their sheets, far from which the pattern has no strength.
+fn filament_inputs(projections: &[Option<SheetProjection>; LANES], rays: &RayTable) -> FilamentInputs {
+    let mut inputs = FilamentInputs { along_km: [0.0; LANES], across_km: [0.0; LANES], strength: [0.0; LANES] };
+    for (lane, projection) in projections.iter().enumerate() {
+        let Some(projection) = projection else { continue };
+        let place = rays.place(projection.sheet, projection.fraction);
+        inputs.along_km[lane] = place.along_km;
+        inputs.across_km[lane] = projection.side as f32;
+        inputs.strength[lane] = place.strength;
+    }
+    inputs
 }
 
 /// Power by lateral position, -1 to 1 within the thickness, relative to the middle. Particles fill the thickness evenly; sheets as bright at their

@@ -1,6 +1,7 @@
 //! Sheets as the simulation sees them: refined, folded, with a ray pattern along their length.
 
 pub(crate) mod arc_length;
+pub(crate) mod filaments;
 pub(crate) mod nodes;
 pub(crate) mod rays;
 pub(crate) mod refined_shape;

@@ -50,6 +50,17 @@ type Noises = [f32; 4];
 pub(crate) struct RayTable {
     /// By sheet, uniformly spaced.
     sheets: Vec<Vec<Noises>>,
+    /// By sheet, at the same places.
+    places: Vec<Vec<SheetPlace>>,
+}
+
+/// Where patterns are on a sheet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SheetPlace {
+    /// Coordinate along the sheet, km.
+    pub(crate) along_km: f32,
+    /// Strength of patterns: 0 where that coordinate is stretched or jumps.
+    pub(crate) strength: f32,
 }
 
 /// Inputs for a batch of positions.
@@ -100,7 +111,7 @@ impl RayPattern {
     ) -> RayTable {
         let level = bansho_base::math::simd::level();
         let node = self.node_km().max(lengths.iter().sum::<f64>() / self.max_nodes);
-        let mut sheets = Vec::with_capacity(lengths.len());
+        let (mut sheets, mut places) = (Vec::with_capacity(lengths.len()), Vec::with_capacity(lengths.len()));
         for (sheet, length) in lengths.iter().enumerate() {
             let last = (length / node).max(1.0).ceil();
             let coordinates = arc_coordinates(sheet, last as usize);
@@ -110,10 +121,16 @@ impl RayPattern {
                 let noises = self.noises(level, &batch, time);
                 nodes.extend((0..coordinates.len()).map(|lane| noises.map(|values| values[lane])));
             }
-            fade(&mut nodes, &coordinates, length / last, self.rays.spacing_km);
+            let strengths = pattern_strengths(&coordinates, length / last, self.rays.spacing_km);
+            for ([left, right, ..], strength) in nodes.iter_mut().zip(&strengths) {
+                *left *= strength;
+                *right *= strength;
+            }
+            let along = coordinates.into_iter().zip(strengths);
+            places.push(along.map(|(along, strength)| SheetPlace { along_km: along as f32, strength }).collect());
             sheets.push(nodes);
         }
-        RayTable { sheets }
+        RayTable { sheets, places }
     }
 
     /// Node spacing for the finest requested pattern.
@@ -226,10 +243,10 @@ fn pattern_noise(seed: u32, fractal: Fractal) -> Noise<2> {
     Noise::new(seed, fractal, [0; 2]).expect("few octaves without a period are noise")
 }
 
-/// Fades the rays near nodes where the coordinate is stretched or discontinuous, over `scale` km on both sides; nodes
-/// are `spacing` km apart.
-fn fade(nodes: &mut [Noises], coordinates: &[f64], spacing: f64, scale: f64) {
-    let mut strengths = vec![1.0_f64; nodes.len()];
+/// Strengths of patterns at nodes that are `spacing` km apart: they fade where the coordinate is stretched or discontinuous, over `scale` km on both
+/// sides.
+fn pattern_strengths(coordinates: &[f64], spacing: f64, scale: f64) -> Vec<f32> {
+    let mut strengths = vec![1.0_f64; coordinates.len()];
     for (node, pair) in coordinates.windows(2).enumerate() {
         let speed = (pair[1] - pair[0]).abs() / spacing.max(f64::MIN_POSITIVE);
         let strength = ((FADE_END_STRETCH - speed) / (FADE_END_STRETCH - FADE_START_STRETCH)).clamp(0.0, 1.0);
@@ -244,10 +261,7 @@ fn fade(nodes: &mut [Noises], coordinates: &[f64], spacing: f64, scale: f64) {
     for node in (1..strengths.len()).rev() {
         strengths[node - 1] = strengths[node - 1].min(strengths[node] + rise);
     }
-    for ([left, right, ..], strength) in nodes.iter_mut().zip(strengths) {
-        *left *= strength as f32;
-        *right *= strength as f32;
-    }
+    strengths.into_iter().map(|strength| strength as f32).collect()
 }
 
 impl RayTable {
@@ -262,6 +276,18 @@ impl RayTable {
             noises[k] = low[k] + t * (high[k] - low[k]);
         }
         noises
+    }
+
+    /// The place at a fraction of a sheet's length.
+    #[inline]
+    pub(crate) fn place(&self, sheet: u32, fraction: f64) -> SheetPlace {
+        let nodes = &self.places[sheet as usize];
+        let (node, t) = split(fraction, nodes.len());
+        let (low, high, t) = (nodes[node], nodes[node + 1], t as f32);
+        SheetPlace {
+            along_km: low.along_km + t * (high.along_km - low.along_km),
+            strength: low.strength + t * (high.strength - low.strength),
+        }
     }
 }
 
