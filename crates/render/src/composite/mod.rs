@@ -12,6 +12,7 @@ pub(crate) mod moments;
 pub(crate) mod moving_members;
 pub(crate) mod plate;
 pub(crate) mod plate_cache;
+mod plate_depth;
 mod plate_light;
 pub(crate) mod plate_lighting;
 mod plate_mapping;

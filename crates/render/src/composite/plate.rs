@@ -1,6 +1,6 @@
 //! The plate of a frame, resampled to the picture: exposed colors, depth for occlusion, and surfaces for light.
 
-use std::{ops::Range, sync::Arc};
+use std::sync::Arc;
 
 use bansho_base::{
     camera::Camera,
@@ -10,16 +10,17 @@ use bansho_base::{
         parallel::prelude::*,
     },
     image::Image,
-    math::{DVec2, simd},
+    math::simd,
     parameters::BuildError,
 };
 
 use super::{
-    plate_mapping::{PlateMapping, depth_of_lens, filter_taps},
+    plate_depth::resample_depth,
+    plate_mapping::{PlateMapping, filter_taps},
     plate_surface::{PlateSurface, SurfaceInputs},
 };
 use crate::{plan::Plan, plate_boxes::decoded};
-use bansho_scene::{PlateDepth, PlatePictures, PlateSky};
+use bansho_scene::{PlatePictures, PlateSky};
 
 /// A plate, as large as the picture with its overscan.
 #[derive(Clone, Debug, Default)]
@@ -70,7 +71,7 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
     let columns: Vec<_> = (0..mapping.picture[0]).map(|x| filter_taps(mapping, 0, x)).collect();
     let view = plan.view_transform();
     let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [0.0; 4]);
-    let covered = covered_columns(mapping);
+    let covered = mapping.covered_columns();
     image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, row)| {
         if !mapping.covers(1, y) {
             return;
@@ -113,13 +114,6 @@ fn remove_sky(color: &mut Image<4>, depth: &Image<1>) {
             *pixel = pixel.map(|value| value * coverage);
         }
     });
-}
-
-/// The columns of the picture that the plate covers.
-fn covered_columns(mapping: &PlateMapping) -> Range<usize> {
-    let covers = |x: &usize| mapping.covers(0, *x);
-    let first = (0..mapping.picture[0]).find(covers).unwrap_or(0);
-    first..(first..mapping.picture[0]).rfind(covers).map_or(first, |last| last + 1)
 }
 
 /// [`over_black`] for many pixels in place.
@@ -194,31 +188,6 @@ fn to_scene(view: &color::View, encoding: Encoding, color: [f32; 3]) -> [f32; 3]
         Encoding::LinearSrgb => color::acescg_from_srgb(color),
         Encoding::LinearAcescg => color,
     }
-}
-
-/// Depth of the nearest value: depths are not interpolated, since between near and far there is nothing.
-fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &PlateMapping) -> Image<1> {
-    let (values, [width, height]) = (depth.values(), depth.size);
-    let per_plate_pixel = [width as f64 / mapping.plate[0] as f64, height as f64 / mapping.plate[1] as f64];
-    let nearest = |axis: usize, pixel: usize| {
-        let position = mapping.plate_position(axis, pixel) * per_plate_pixel[axis];
-        (position as usize).min(depth.size[axis] - 1)
-    };
-    let covered = covered_columns(mapping);
-    let columns: Vec<usize> = covered.clone().map(|x| nearest(0, x)).collect();
-    let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [f32::INFINITY]);
-    image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, row)| {
-        if !mapping.covers(1, y) {
-            return;
-        }
-        let values = &values[nearest(1, y) * width..][..width];
-        for ((pixel, column), x) in row[covered.clone()].iter_mut().zip(&columns).zip(covered.clone()) {
-            let meters = depth.scale.meters_of(values[*column]);
-            pixel[0] =
-                depth_of_lens(camera, depth.scale.kind, meters, DVec2::new(x as f64 + 0.5, y as f64 + 0.5)) as f32;
-        }
-    });
-    image
 }
 
 #[cfg(test)]

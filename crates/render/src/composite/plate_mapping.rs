@@ -1,5 +1,7 @@
 //! Where the pixels of a plate are in the picture, and how they are resampled.
 
+use std::ops::Range;
+
 use bansho_base::{
     camera::{Camera, Lens},
     math::DVec2,
@@ -44,6 +46,13 @@ impl PlateMapping {
 
     pub(super) fn covers(&self, axis: usize, pixel: usize) -> bool {
         (0.0..=self.plate[axis] as f64).contains(&self.plate_position(axis, pixel))
+    }
+
+    /// The columns of the picture that the plate covers.
+    pub(super) fn covered_columns(&self) -> Range<usize> {
+        let covers = |x: &usize| self.covers(0, *x);
+        let first = (0..self.picture[0]).find(covers).unwrap_or(0);
+        first..(first..self.picture[0]).rfind(covers).map_or(first, |last| last + 1)
     }
 }
 
