@@ -52,14 +52,18 @@ impl<'a, T, M: Fn(&mut Frame, &dyn Observer) -> T> TileCollector<'a, T, M> {
 
 impl<T: Send, M: Fn(&mut Frame, &dyn Observer) -> T + Sync> FrameSink for TileCollector<'_, T, M> {
     type Target = SceneLinear;
+    /// Number of the frame, and its tile.
+    type Encoded = (i64, T);
 
     fn target(&self) -> &SceneLinear {
         &SceneLinear
     }
 
-    fn finish(&self, index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(), JobError> {
-        let number = frame.header.number;
-        let tile = (self.make_tile)(frame, observer);
+    fn encode(&self, _index: usize, frame: &mut Frame, observer: &dyn Observer) -> Result<(i64, T), JobError> {
+        Ok((frame.header.number, (self.make_tile)(frame, observer)))
+    }
+
+    fn commit(&self, index: usize, (number, tile): (i64, T), _observer: &dyn Observer) -> Result<(), JobError> {
         let mut tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner);
         tiles[index] = Some(tile);
         let drawn = tiles.iter().flatten().count();

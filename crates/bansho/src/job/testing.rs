@@ -126,17 +126,31 @@ impl JobObserver for RecordingObserver {
 pub(crate) struct FunctionSink<F> {
     pub(crate) each: F,
     pub(crate) max_in_flight: usize,
+    /// Indices of the frames that were committed.
+    pub(crate) committed: Mutex<Vec<usize>>,
+}
+
+impl<F> FunctionSink<F> {
+    pub(crate) fn new(each: F, max_in_flight: usize) -> Self {
+        Self { each, max_in_flight, committed: Mutex::default() }
+    }
 }
 
 impl<F: Fn(usize, i64) -> Result<(), JobError> + Sync> FrameSink for FunctionSink<F> {
     type Target = SceneLinear;
+    type Encoded = ();
 
     fn target(&self) -> &SceneLinear {
         &SceneLinear
     }
 
-    fn finish(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
+    fn encode(&self, index: usize, frame: &mut Frame, _observer: &dyn Observer) -> Result<(), JobError> {
         (self.each)(index, frame.header.number)
+    }
+
+    fn commit(&self, index: usize, (): (), _observer: &dyn Observer) -> Result<(), JobError> {
+        self.committed.lock().unwrap().push(index);
+        Ok(())
     }
 
     fn max_in_flight(&self) -> usize {

@@ -5,6 +5,7 @@ use std::{f32::consts::PI, sync::OnceLock};
 use bansho_base::{
     camera::directions::Directions,
     color::{acescg_from_srgb, luminance},
+    host::once::get_or_compute,
     math::{
         DVec2,
         simd::{LANES, Lanes, Real, any_positive},
@@ -258,7 +259,8 @@ impl PreparedGround<'_> {
             return planes;
         }
         let mut planes = [[0.0; LANES]; 3];
-        let night_sky = self.night_sky.get_or_init(|| {
+        // Not by `get_or_init`: the glow of a town is computed in parallel.
+        let night_sky = get_or_compute(&self.night_sky, || {
             let night = sky.night()?;
             Some(NightSky::new(sky, night, 0.0, SkyObserver::ON_THE_GROUND))
         });

@@ -103,6 +103,19 @@ pub enum FinishedPicture<'a> {
     Display(&'a DisplayImage, &'a [u8; 32]),
 }
 
+/// A frame as its file or film takes it, and where it goes: [`Sink::commit`] writes it.
+pub struct EncodedFrame {
+    slot: FrameSlot,
+    bytes: EncodedBytes,
+}
+
+enum EncodedBytes {
+    File(Vec<u8>),
+    Apng(<ApngFilm as FilmEncoder>::EncodedFrame),
+    Gif(<GifFilm as FilmEncoder>::EncodedFrame),
+    Video(<FfmpegFilm as FilmEncoder>::EncodedFrame),
+}
+
 /// Writes finished frames. May be used from several threads at once.
 ///
 /// Frames of a sequence may be written in any order; each file is complete or does not exist. Frames of a film may be written in any order
@@ -177,32 +190,57 @@ impl Sink {
     /// # Errors
     /// The frame cannot be written or would replace a file that must stay, has the wrong pixel format or size, or is out of order.
     pub fn write(&self, slot: FrameSlot, picture: FinishedPicture<'_>) -> Result<(), MediaError> {
+        self.commit(self.encode(slot, picture)?)
+    }
+
+    /// Encodes a frame and writes nothing: most of the work of [`write`](Self::write), in any order.
+    ///
+    /// # Errors
+    /// The frame has the wrong pixel format or size, or its format cannot hold it.
+    pub fn encode(&self, slot: FrameSlot, picture: FinishedPicture<'_>) -> Result<EncodedFrame, MediaError> {
         let path = self.path(slot.number);
-        match (&self.target, picture) {
-            (SinkTarget::Exr, FinishedPicture::Linear(frame)) => {
-                atomic::write_bytes(&path, &exr::encode(frame, &path)?, &self.options.overwrite)
-            }
+        let bytes = match (&self.target, picture) {
+            (SinkTarget::Exr, FinishedPicture::Linear(frame)) => EncodedBytes::File(exr::encode(frame, &path)?),
             (SinkTarget::Png, FinishedPicture::Display(image, fingerprint)) => {
-                let bytes = png::encode(image, fingerprint, self.options.png_effort, &path)?;
-                atomic::write_bytes(&path, &bytes, &self.options.overwrite)
+                EncodedBytes::File(png::encode(image, fingerprint, self.options.png_effort, &path)?)
             }
-            (SinkTarget::Apng(film), FinishedPicture::Display(image, _)) => {
+            (SinkTarget::Apng(_), FinishedPicture::Display(image, _)) => {
                 self.check_frame(image, &path)?;
-                film.push(slot.index, apng::prepare(image, self.options.opaque, &path)?)
+                EncodedBytes::Apng(apng::prepare(image, self.options.opaque, &path)?)
             }
-            (SinkTarget::Gif(film, format), FinishedPicture::Display(image, _)) => {
+            (SinkTarget::Gif(_, format), FinishedPicture::Display(image, _)) => {
                 self.check_frame(image, &path)?;
-                film.push(slot.index, gif::prepare(image, slot.index, format, &path)?)
+                EncodedBytes::Gif(gif::prepare(image, slot.index, format, &path)?)
             }
-            (SinkTarget::Video(film, format), FinishedPicture::Display(image, _)) => {
+            (SinkTarget::Video(_, format), FinishedPicture::Display(image, _)) => {
                 self.check_frame(image, &path)?;
-                film.push(slot.index, ffmpeg::prepare(image, format))
+                EncodedBytes::Video(ffmpeg::prepare(image, format))
             }
             (SinkTarget::Exr, FinishedPicture::Display(..))
             | (
                 SinkTarget::Png | SinkTarget::Apng(_) | SinkTarget::Gif(..) | SinkTarget::Video(..),
                 FinishedPicture::Linear(_),
-            ) => Err(MediaError::WrongPicture { path, expected: self.picture_format() }),
+            ) => return Err(MediaError::WrongPicture { path, expected: self.picture_format() }),
+        };
+        Ok(EncodedFrame { slot, bytes })
+    }
+
+    /// Writes a frame that this sink has encoded.
+    ///
+    /// # Errors
+    /// The frame cannot be written, would replace a file that must stay, or is out of order.
+    ///
+    /// # Panics
+    /// A sink of another format encoded it.
+    pub fn commit(&self, EncodedFrame { slot, bytes }: EncodedFrame) -> Result<(), MediaError> {
+        match (&self.target, bytes) {
+            (SinkTarget::Exr | SinkTarget::Png, EncodedBytes::File(bytes)) => {
+                atomic::write_bytes(&self.path(slot.number), &bytes, &self.options.overwrite)
+            }
+            (SinkTarget::Apng(film), EncodedBytes::Apng(encoded)) => film.push(slot.index, encoded),
+            (SinkTarget::Gif(film, _), EncodedBytes::Gif(encoded)) => film.push(slot.index, encoded),
+            (SinkTarget::Video(film, _), EncodedBytes::Video(encoded)) => film.push(slot.index, encoded),
+            _ => unreachable!("a frame is committed by the sink that encoded it"),
         }
     }
 

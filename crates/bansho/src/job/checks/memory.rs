@@ -76,9 +76,13 @@ pub(crate) fn frames_drawn_at_once(compiled: &CompiledScene, plan: &Plan, reques
         FramesInFlight::Auto => {
             let window = source_window(plan);
             let frame = FrameBytes::new(compiled, plan, request, channel_count(compiled, plan));
-            let bytes = (frame.drawn() + frame.written) * pixel_count([window.width, window.height], 0);
+            let pixels = pixel_count([window.width, window.height], 0);
+            let bytes = (frame.drawn() + frame.written) * pixels + phenomena_bytes(compiled, plan, pixels);
             let by_memory = (MAX_BYTES_DRAWN_AT_ONCE / bytes.max(1.0)) as usize;
-            threads.min(MAX_DRAWN_AT_ONCE).min(by_memory).min(request.frames / MIN_FRAMES_FOR_EACH)
+            let most = threads.min(MAX_DRAWN_AT_ONCE).min(by_memory).min(request.frames / MIN_FRAMES_FOR_EACH);
+            // One frame may fit where several do not.
+            let fixed = fixed_picture_bytes(compiled, plan);
+            (2..=most).rev().find(|count| memory::can_allocate(*count as f64 * bytes + fixed)).unwrap_or(1)
         }
     };
     count.min(request.frames).max(1)

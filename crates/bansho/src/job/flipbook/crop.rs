@@ -145,13 +145,18 @@ struct LitRegionProbe {
 
 impl FrameSink for LitRegionProbe {
     type Target = DisplayOptions;
+    /// The lit region of the frame.
+    type Encoded = Rect;
 
     fn target(&self) -> &DisplayOptions {
         &self.target
     }
 
-    fn finish(&self, _index: usize, frame: &mut DisplayFrame, _observer: &dyn Observer) -> Result<(), JobError> {
-        let frame_bounds = bounds(&frame.image, self.min_alpha);
+    fn encode(&self, _index: usize, frame: &mut DisplayFrame, _observer: &dyn Observer) -> Result<Rect, JobError> {
+        Ok(bounds(&frame.image, self.min_alpha))
+    }
+
+    fn commit(&self, _index: usize, frame_bounds: Rect, _observer: &dyn Observer) -> Result<(), JobError> {
         let mut lit = self.lit.lock().unwrap_or_else(PoisonError::into_inner);
         *lit = lit.union(&frame_bounds);
         Ok(())

@@ -12,7 +12,7 @@ use bansho_render::{Target, display::DisplayFrame};
 
 use super::{
     FrameSource,
-    in_flight::{CompletionGuard, InFlightFrames, StopOnFailure},
+    in_flight::{CompletionGuard, InFlightFrames, InOrder, StopOnFailure},
     snapshots::Snapshots,
 };
 use crate::job::{checks::memory::max_frames_with_pixels, error::JobError, observer::JobObserver};
@@ -21,17 +21,23 @@ use crate::job::{checks::memory::max_frames_with_pixels, error::JobError, observ
 pub(crate) trait FrameSink: Sync {
     /// What frames are drawn as.
     type Target: Target<Frame: DrawnFrame>;
+    /// What is kept of a frame until it is committed.
+    type Encoded: Send;
 
     /// What frames are drawn as.
     fn target(&self) -> &Self::Target;
 
-    /// Uses the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight).
-    fn finish(
+    /// Encodes the frame at position `index` of the list, in any thread and any order within [`max_in_flight`](Self::max_in_flight). Nothing is
+    /// written yet.
+    fn encode(
         &self,
         index: usize,
         frame: &mut <Self::Target as Target>::Frame,
         observer: &dyn Observer,
-    ) -> Result<(), JobError>;
+    ) -> Result<Self::Encoded, JobError>;
+
+    /// Writes an encoded frame and names it finished: in the order of the list, one after the other, and none after one that failed.
+    fn commit(&self, index: usize, encoded: Self::Encoded, observer: &dyn Observer) -> Result<(), JobError>;
 
     /// How many frames may be in flight at once.
     fn max_in_flight(&self) -> usize;
@@ -135,7 +141,8 @@ const MAX_BYTES_IN_FLIGHT: usize = 1 << 30;
 /// Runs in the caller's rayon pool, and uses no other thread.
 ///
 /// # Errors
-/// The first failure of a frame, or the observer canceled the job. Finished frames are kept.
+/// The failure of a frame, of several that of the first in the list, or the observer canceled the job. The frames before it that are finished are kept; none after it is
+/// written.
 pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
     shot: &mut S,
     numbers: &[i64],
@@ -150,6 +157,7 @@ pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
     }
     let in_flight = InFlightFrames::default();
     let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
+    let finished = InOrder::default();
     let (mut last, mut max_with_light) = (None, usize::MAX);
     let drawn = rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
@@ -163,7 +171,7 @@ pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
             let light_bytes = frame.light_bytes();
             max_with_light = max_frames_with_pixels(light_bytes, sink.writes_pixels());
             in_flight.submit(index, in_flight_limit(light_bytes, sink.max_in_flight()), frame.keeps_light());
-            spawn_finish(scope, sink, &stop_on_failure, index, frame);
+            spawn_finish(scope, (sink, &finished), &stop_on_failure, index, frame);
         }
         Ok(())
     });
@@ -192,21 +200,21 @@ fn draw_independent<S: FrameSource, K: FrameSink>(
     let window = sources.len().min(sink.max_in_flight()).max(1);
     let in_flight = InFlightFrames::default();
     let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
-    let free = Mutex::new(sources);
+    let (free, finished) = (Mutex::new(sources), InOrder::default());
     rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
             in_flight.submit(index, window, true);
             if stop_on_failure.cancelled() {
                 break;
             }
-            let (in_flight, free, stop_on_failure) = (&in_flight, &free, &stop_on_failure);
+            let (in_flight, free, finished, stop_on_failure) = (&in_flight, &free, &finished, &stop_on_failure);
             scope.spawn_fifo(move |_| {
                 let _completion = CompletionGuard { in_flight, index };
                 // There are as many sources as frames in the window, and a frame returns its source before it leaves the window.
                 let Some(mut source) = lock(free).pop() else { return };
-                let drawn = draw_and_finish(&mut source, (index, number), sink, stop_on_failure);
+                let encoded = draw_and_encode(&mut source, (index, number), sink, stop_on_failure);
                 lock(free).push(source);
-                drawn.unwrap_or_else(|error| in_flight.fail(error));
+                finish(encoded, index, (sink, finished), stop_on_failure);
             });
         }
     });
@@ -214,20 +222,36 @@ fn draw_independent<S: FrameSource, K: FrameSink>(
     check(observer).map_err(|_| JobError::Cancelled)
 }
 
-/// Draws frame `number`, which is at position `index` of the list, and finishes it.
-fn draw_and_finish<S: FrameSource, K: FrameSink>(
+/// Draws frame `number`, which is at position `index` of the list, and encodes it.
+fn draw_and_encode<S: FrameSource, K: FrameSink>(
     source: &mut S,
     (index, number): (usize, i64),
     sink: &K,
     observer: &StopOnFailure,
-) -> Result<(), JobError> {
+) -> Result<K::Encoded, JobError> {
     source.advance(number, observer)?;
     let mut frame = source.draw(sink.target(), observer)?;
-    sink.finish(index, &mut frame, observer)?;
+    let encoded = sink.encode(index, &mut frame, observer)?;
     if let Some(light) = frame.into_light() {
         source.recycle(light);
     }
-    Ok(())
+    Ok(encoded)
+}
+
+/// Commits a frame once those before it are, or tells why there is none.
+fn finish<K: FrameSink>(
+    encoded: Result<K::Encoded, JobError>,
+    index: usize,
+    (sink, finished): (&K, &InOrder<K::Encoded>),
+    observer: &StopOnFailure,
+) {
+    let committed = match encoded {
+        Ok(encoded) => finished.push(index, encoded, |index, encoded| sink.commit(index, encoded, observer)),
+        Err(error) => Err((index, error)),
+    };
+    if let Err((index, error)) = committed {
+        observer.in_flight.fail(index, error);
+    }
 }
 
 /// The sources are only pushed and popped under the lock, so they are valid even if a thread panicked.
@@ -238,7 +262,7 @@ fn lock<S>(sources: &Mutex<Vec<S>>) -> MutexGuard<'_, Vec<S>> {
 /// Finishes a drawn frame.
 fn spawn_finish<'scope, K: FrameSink>(
     scope: &rayon::ScopeFifo<'scope>,
-    sink: &'scope K,
+    (sink, finished): (&'scope K, &'scope InOrder<K::Encoded>),
     stop_on_failure: &'scope StopOnFailure,
     index: usize,
     mut frame: <K::Target as Target>::Frame,
@@ -251,10 +275,11 @@ fn spawn_finish<'scope, K: FrameSink>(
         if stop_on_failure.cancelled() {
             return;
         }
-        sink.finish(index, &mut frame, stop_on_failure).unwrap_or_else(|error| in_flight.fail(error));
+        let encoded = sink.encode(index, &mut frame, stop_on_failure);
         if let Some(light) = frame.into_light() {
             in_flight.recycle(index, light);
         }
+        finish(encoded, index, (sink, finished), stop_on_failure);
     });
 }
 
@@ -322,7 +347,7 @@ mod tests {
                 done.lock().unwrap().push((index, number));
                 Ok(())
             };
-            let sink = FunctionSink { each, max_in_flight: 64 };
+            let sink = FunctionSink::new(each, 64);
             in_pool(threads, || run(&[3, 4, 9, 10], drawn_at_once, &sink, &RecordingObserver::default())).unwrap();
             let mut done = done.into_inner().unwrap();
             done.sort_unstable();
@@ -344,7 +369,7 @@ mod tests {
                 Ok(())
             };
             let numbers: Vec<i64> = (0..60).collect();
-            let sink = FunctionSink { each, max_in_flight: WINDOW };
+            let sink = FunctionSink::new(each, WINDOW);
             in_pool(8, || run(&numbers, drawn_at_once, &sink, &RecordingObserver::default())).unwrap();
             let furthest = furthest.into_inner();
             assert!((1..WINDOW).contains(&furthest), "{furthest}: frames must overlap, but stay within the window");
@@ -353,16 +378,18 @@ mod tests {
 
     #[test]
     fn a_failure_stops_the_work_and_is_returned() {
-        for drawn_at_once in [1, 2] {
+        for drawn_at_once in [1, 2, 4] {
             let finished = AtomicUsize::new(0);
             let each = |index, _| {
                 finished.fetch_add(1, Ordering::Relaxed);
                 if index == 5 { Err(OptionError::NoFrames.into()) } else { Ok(()) }
             };
             let numbers: Vec<i64> = (0..100_000).collect();
-            let sink = FunctionSink { each, max_in_flight: 8 };
-            let result = in_pool(2, || run(&numbers, drawn_at_once, &sink, &RecordingObserver::default()));
+            let sink = FunctionSink::new(each, 8);
+            let result = in_pool(4, || run(&numbers, drawn_at_once, &sink, &RecordingObserver::default()));
             assert!(matches!(result, Err(JobError::Option(OptionError::NoFrames))), "{result:?}");
+            let committed = sink.committed.into_inner().unwrap();
+            assert!(committed.len() <= 5 && committed.iter().copied().eq(0..committed.len()), "{committed:?}");
             assert!(finished.into_inner() < 100, "drawing must stop");
         }
     }
@@ -379,7 +406,7 @@ mod tests {
                 Ok(())
             };
             let numbers: Vec<i64> = (0..100_000).collect();
-            let sink = FunctionSink { each, max_in_flight: 8 };
+            let sink = FunctionSink::new(each, 8);
             let result = in_pool(2, || run(&numbers, drawn_at_once, &sink, &observer));
             assert!(matches!(result, Err(JobError::Cancelled)), "{result:?}");
             assert!((10..100).contains(&finished.into_inner()));
@@ -396,7 +423,7 @@ mod tests {
             Ok(())
         };
         let numbers: Vec<i64> = (0..40).collect();
-        let sink = FunctionSink { each, max_in_flight: 64 };
+        let sink = FunctionSink::new(each, 64);
         in_pool(4, || run(&numbers, 3, &sink, &RecordingObserver::default())).unwrap();
         let most = most.into_inner();
         assert!((2..=3).contains(&most), "{most} at once");

@@ -1,7 +1,8 @@
-//! Frames that are drawn and not yet written. Their number is bounded, so that memory does not grow. The first failure is kept.
+//! Frames that are drawn and not yet written. Their number is bounded, so that memory does not grow. They are written in order, and of several failures that of the
+//! first frame is kept.
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     sync::{
         Condvar, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
@@ -30,7 +31,8 @@ struct State {
     unfinished: BTreeSet<usize>,
     /// Those of them whose light is in memory.
     with_light: BTreeSet<usize>,
-    error: Option<JobError>,
+    /// The failure that is told, and the index of its frame.
+    error: Option<(usize, JobError)>,
     recycled: Option<Frame>,
 }
 
@@ -88,12 +90,15 @@ impl InFlightFrames {
         self.lock().recycled.take()
     }
 
-    /// Keeps the first failure, and cancels the remaining work. A frame of a film that another thread writes can fail as a consequence of it and
-    /// arrive here earlier; the cause takes its place.
-    pub(crate) fn fail(&self, error: JobError) {
+    /// Keeps the failure of frame `index`, unless one before it has failed, and cancels the remaining work. Other frames can fail as a consequence of it and
+    /// arrive here earlier; the cause takes their place.
+    pub(crate) fn fail(&self, index: usize, error: JobError) {
         let mut state = self.lock();
-        if state.error.as_ref().is_none_or(follows_from_another) {
-            state.error = Some(error);
+        let is_told = state.error.as_ref().is_none_or(|(first, told)| {
+            follows_from_another(told) || (index < *first && !follows_from_another(&error))
+        });
+        if is_told {
+            state.error = Some((index, error));
         }
         drop(state);
         self.failed.store(true, Ordering::Relaxed);
@@ -104,15 +109,68 @@ impl InFlightFrames {
         self.failed.load(Ordering::Relaxed)
     }
 
-    /// The first failure, if there was one.
+    /// The failure of the first frame that failed, if there was one.
     pub(crate) fn take_error(&self) -> Option<JobError> {
-        self.lock().error.take()
+        self.lock().error.take().map(|(_, error)| error)
     }
 }
 
 /// Whether a failure only says that another one came before it.
 fn follows_from_another(error: &JobError) -> bool {
-    matches!(error, JobError::Media(MediaError::AlreadyFailed { .. }))
+    matches!(error, JobError::Cancelled | JobError::Media(MediaError::AlreadyFailed { .. }))
+}
+
+/// Commits encoded frames in the order of the job, whichever threads have encoded them: none is written after one that failed.
+pub(crate) struct InOrder<E>(Mutex<Waiting<E>>);
+
+struct Waiting<E> {
+    /// Index of the frame that is committed next.
+    next: usize,
+    encoded: BTreeMap<usize, E>,
+    /// Whether a thread commits frames; it stays so after a failure.
+    is_committing: bool,
+}
+
+impl<E> Default for InOrder<E> {
+    fn default() -> Self {
+        Self(Mutex::new(Waiting { next: 0, encoded: BTreeMap::new(), is_committing: false }))
+    }
+}
+
+impl<E> InOrder<E> {
+    fn lock(&self) -> MutexGuard<'_, Waiting<E>> {
+        // The lock is only held for inserts and removals.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Commits frame `index`, if those before it are, and after it those that have waited for it; otherwise it waits. While one thread commits, no other waits for it.
+    ///
+    /// # Errors
+    /// The failure of a commit, with the index of its frame.
+    pub(crate) fn push(
+        &self,
+        index: usize,
+        encoded: E,
+        commit: impl Fn(usize, E) -> Result<(), JobError>,
+    ) -> Result<(), (usize, JobError)> {
+        let mut waiting = self.lock();
+        waiting.encoded.insert(index, encoded);
+        if waiting.is_committing {
+            return Ok(());
+        }
+        waiting.is_committing = true;
+        loop {
+            let next = waiting.next;
+            let Some(encoded) = waiting.encoded.remove(&next) else {
+                waiting.is_committing = false;
+                return Ok(());
+            };
+            drop(waiting);
+            commit(next, encoded).map_err(|error| (next, error))?;
+            waiting = self.lock();
+            waiting.next += 1;
+        }
+    }
 }
 
 /// Marks frame `index` as finished when it is dropped, also by a panic, so that no thread waits for it forever.
@@ -173,11 +231,46 @@ mod tests {
         let consequence = || JobError::Media(MediaError::AlreadyFailed { path: path.clone() });
         for failures in [[cause(), consequence()], [consequence(), cause()]] {
             let in_flight = InFlightFrames::default();
-            failures.into_iter().for_each(|error| in_flight.fail(error));
+            failures.into_iter().zip([4, 3]).for_each(|(error, index)| in_flight.fail(index, error));
             assert!(in_flight.has_failed());
             let kept = in_flight.take_error();
             assert!(matches!(kept, Some(JobError::Media(MediaError::DiskFull { .. }))), "{kept:?}");
         }
+    }
+
+    #[test]
+    fn of_several_failures_that_of_the_first_frame_is_told() {
+        let full = |name: &str| JobError::Media(MediaError::DiskFull { path: PathBuf::from(name) });
+        let in_flight = InFlightFrames::default();
+        in_flight.fail(7, full("7.png"));
+        in_flight.fail(5, full("5.png"));
+        in_flight.fail(6, full("6.png"));
+        in_flight.fail(4, JobError::Cancelled);
+        let kept = in_flight.take_error();
+        let is_first =
+            matches!(&kept, Some(JobError::Media(MediaError::DiskFull { path })) if path.as_os_str() == "5.png");
+        assert!(is_first, "{kept:?}");
+    }
+
+    #[test]
+    fn frames_are_committed_in_order_and_none_after_one_that_failed() {
+        let order = InOrder::default();
+        let committed = Mutex::new(Vec::new());
+        let push = |index: usize| {
+            order.push(index, index, |index, _| {
+                committed.lock().unwrap().push(index);
+                if index == 4 { Err(JobError::Cancelled) } else { Ok(()) }
+            })
+        };
+        for index in [1, 0, 3] {
+            push(index).unwrap();
+        }
+        assert_eq!(*committed.lock().unwrap(), [0, 1]);
+        push(5).unwrap();
+        push(4).unwrap();
+        assert!(matches!(push(2), Err((4, JobError::Cancelled))));
+        push(6).unwrap();
+        assert_eq!(*committed.lock().unwrap(), [0, 1, 2, 3, 4]);
     }
 
     #[test]

@@ -245,7 +245,7 @@ mod tests {
     /// Draws the frames and returns how many steps that took.
     fn steps(snapshots: &Snapshots, numbers: &[i64], observer: &RecordingObserver) -> usize {
         let mut source = CountingSource::new();
-        let sink = FunctionSink { each: |_, _| Ok(()), max_in_flight: 4 };
+        let sink = FunctionSink::new(|_, _| Ok(()), 4);
         draw_frames(&mut source, numbers, snapshots, 1, &sink, observer).unwrap();
         source.steps
     }

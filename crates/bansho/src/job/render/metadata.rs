@@ -20,17 +20,16 @@ pub(crate) fn path(picture: &Path) -> PathBuf {
     picture.with_extension("json")
 }
 
-/// Writes the metadata of a frame beside `picture`, atomically.
+/// The text of the metadata of a frame that is written to `picture`.
+pub(crate) fn text(header: &FrameHeader, phenomena: &[PhenomenonMetadata], picture: &Path) -> String {
+    format!("{:#}\n", describe(header, phenomena, picture))
+}
+
+/// Writes the text of metadata beside `picture`, atomically.
 ///
 /// # Errors
 /// The file cannot be written, or would replace one that must not be overwritten.
-pub(crate) fn write(
-    header: &FrameHeader,
-    phenomena: &[PhenomenonMetadata],
-    picture: &Path,
-    overwrite: &OverwritePolicy,
-) -> Result<(), MediaError> {
-    let text = format!("{:#}\n", describe(header, phenomena, picture));
+pub(crate) fn write(text: &str, picture: &Path, overwrite: &OverwritePolicy) -> Result<(), MediaError> {
     atomic::write_bytes(&path(picture), text.as_bytes(), overwrite)
 }
 
@@ -86,7 +85,7 @@ mod tests {
         let phenomena = [PhenomenonMetadata { phenomenon: "shower".to_owned(), entries }];
         let fingerprint = header.fingerprint;
         assert!(!exists(&picture, fingerprint));
-        write(&header, &phenomena, &picture, &OverwritePolicy::default()).unwrap();
+        write(&text(&header, &phenomena, &picture), &picture, &OverwritePolicy::default()).unwrap();
         assert!(provenance::is_bansho_file(&path(&picture)));
         let value: Value = serde_json::from_slice(&fs::read(folder.path().join("rain.0007.json")).unwrap()).unwrap();
         assert_eq!(value["phenomena"]["shower"]["rate"], json!({ "value": 20.0, "unit": "mm/h" }));

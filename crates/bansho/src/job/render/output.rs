@@ -13,7 +13,7 @@ use bansho_base::{
 use bansho_media::{
     files::{naming::OutputPattern, overwrite_policy::OverwritePolicy},
     format::{OutputKind, PictureFormat},
-    output::sink::{FrameSlot, Sink, SinkOptions},
+    output::sink::{EncodedFrame, FrameSlot, Sink, SinkOptions},
 };
 use bansho_render::{
     Plan, Target,
@@ -84,29 +84,30 @@ impl Format {
         Ok(Sink::open(self.pattern.clone(), options)?)
     }
 
-    /// Writes a frame, and returns its number.
-    fn write(
+    /// Encodes a frame and its metadata, if they are requested.
+    fn encode(
         &self,
         sink: &Sink,
         index: usize,
         frame: &mut impl DrawnFrame,
         observer: &dyn Observer,
-    ) -> Result<i64, JobError> {
+    ) -> Result<EncodedPicture, JobError> {
         let header = frame.header_mut();
         header.fingerprint = self.fingerprint(header.fingerprint);
         let number = header.number;
-        self.write_metadata(sink, number, frame)?;
+        let metadata = self.metadata.then(|| metadata::text(frame.header(), frame.metadata(), &sink.path(number)));
         let _stage = StageGuard::begin(observer, Stage::Write);
-        sink.write(FrameSlot { index, number }, frame.picture())?;
-        Ok(number)
+        let picture = sink.encode(FrameSlot { index, number }, frame.picture())?;
+        Ok(EncodedPicture { number, metadata, picture })
     }
 
-    /// Writes the metadata of a frame if requested: before the picture, so that every existing picture has its metadata.
-    fn write_metadata(&self, sink: &Sink, number: i64, frame: &impl DrawnFrame) -> Result<(), JobError> {
-        if self.metadata {
-            metadata::write(frame.header(), frame.metadata(), &sink.path(number), &self.overwrite)?;
+    /// Writes the metadata of a frame, and then the picture, so that every existing picture has its metadata.
+    fn write(&self, sink: &Sink, encoded: EncodedPicture, observer: &dyn Observer) -> Result<(), JobError> {
+        let _stage = StageGuard::begin(observer, Stage::Write);
+        if let Some(metadata) = &encoded.metadata {
+            metadata::write(metadata, &sink.path(encoded.number), &self.overwrite)?;
         }
-        Ok(())
+        Ok(sink.commit(encoded.picture)?)
     }
 
     /// How light becomes the display pixels that the sink takes; `None` if it takes light.
@@ -126,6 +127,14 @@ impl Format {
     }
 }
 
+/// A frame that is ready to be written.
+pub(crate) struct EncodedPicture {
+    number: i64,
+    /// The text of its metadata, if that is written.
+    metadata: Option<String>,
+    picture: EncodedFrame,
+}
+
 /// Writes every frame to the sink.
 pub(crate) struct FileWriter<'a, T> {
     pub(crate) format: &'a Format,
@@ -140,13 +149,19 @@ pub(crate) struct FileWriter<'a, T> {
 
 impl<T: Target<Frame: DrawnFrame>> FrameSink for FileWriter<'_, T> {
     type Target = T;
+    type Encoded = EncodedPicture;
 
     fn target(&self) -> &T {
         &self.target
     }
 
-    fn finish(&self, index: usize, frame: &mut T::Frame, observer: &dyn Observer) -> Result<(), JobError> {
-        let number = self.format.write(self.sink, index, frame, observer)?;
+    fn encode(&self, index: usize, frame: &mut T::Frame, observer: &dyn Observer) -> Result<EncodedPicture, JobError> {
+        self.format.encode(self.sink, index, frame, observer)
+    }
+
+    fn commit(&self, _index: usize, encoded: EncodedPicture, observer: &dyn Observer) -> Result<(), JobError> {
+        let number = encoded.number;
+        self.format.write(self.sink, encoded, observer)?;
         let drawn = self.drawn.fetch_add(1, Ordering::Relaxed) + 1;
         let path = self.sink.kind().is_sequence().then(|| self.sink.path(number));
         path.iter().flat_map(|path| self.format.files(path)).for_each(|file| self.finished.record(file));
