@@ -102,18 +102,19 @@ impl PlateRows<'_> {
         // Straight alpha of linear light multiplies the light; elsewhere values are multiplied before they are converted, as in `plate::over_black`.
         let multiplies_light = self.alpha == PictureAlpha::Straight(color::AlphaConvention::Linear);
         light.clear();
-        light.extend(row.iter().map(|pixel| if multiplies_light { *pixel } else { self.alpha.premultiplied(*pixel) }));
+        let values = row.iter().map(|pixel| if multiplies_light { *pixel } else { self.alpha.premultiplied(*pixel) });
         match self.picture.encoding {
             Encoding::DisplaySrgb => {
-                light.iter_mut().flat_map(|pixel| &mut pixel[..3]).for_each(|value| *value = decoded(*value));
+                light.extend(values.map(|[r, g, b, alpha]| [decoded(r), decoded(g), decoded(b), alpha]));
                 self.view.to_scene_row(simd::level(), light);
             }
             Encoding::LinearSrgb => {
-                for pixel in light.iter_mut() {
-                    [pixel[0], pixel[1], pixel[2]] = color::acescg_from_srgb([pixel[0], pixel[1], pixel[2]]);
-                }
+                light.extend(values.map(|[r, g, b, alpha]| {
+                    let [r, g, b] = color::acescg_from_srgb([r, g, b]);
+                    [r, g, b, alpha]
+                }));
             }
-            Encoding::LinearAcescg => {}
+            Encoding::LinearAcescg => light.extend(values),
         }
         if multiplies_light {
             light.iter_mut().for_each(|[r, g, b, a]| [*r, *g, *b] = [*r * *a, *g * *a, *b * *a]);

@@ -87,7 +87,7 @@ impl HaloCorrector<'_> {
         }
         // The finer grid holds the light times the distance of the ray from the lamp, which is smooth; the exact distance of each pixel is divided
         // out here.
-        let inverse_distances = self.inverse_ray_distances(&directions);
+        let (inverse_distances, gains) = (self.inverse_ray_distances(&directions), segments.gains());
         for i in 0..LANES {
             if fades[i] <= 0.0 {
                 continue;
@@ -95,8 +95,9 @@ impl HaloCorrector<'_> {
             let column = x as f32 + i as f32 + 0.5;
             let (fine_distances, distances) =
                 (self.halo.fine_in_scattering.distances, self.halo.in_scattering.distances);
-            let fine = light_at_column(&segments, i, &self.halo.fine_tiles, &rows.fine, fine_distances, column);
-            let coarse = light_at_column(&segments, i, &self.halo.tiles, &rows.coarse, distances, column);
+            let fine =
+                light_at_column(&segments, i, gains[i], &self.halo.fine_tiles, &rows.fine, fine_distances, column);
+            let coarse = light_at_column(&segments, i, gains[i], &self.halo.tiles, &rows.coarse, distances, column);
             for c in 0..3 {
                 corrections[i][c] = fades[i] * (fine[c] * inverse_distances[i] - coarse[c]);
             }
@@ -133,12 +134,13 @@ impl HaloCorrector<'_> {
     }
 }
 
-/// Light that is scattered within the segment of lane `i`, between the columns of corners of a grid on both sides of a `column` of the picture (pixels);
+/// Light that is scattered within the segment of lane `i`, whose gain is `gain`, between the columns of corners of a grid on both sides of a `column` of the picture (pixels);
 /// `sums` is a row of corners with so many distances each.
 #[inline(always)]
 fn light_at_column(
     segments: &RaySegments,
     i: usize,
+    gain: f32,
     tiles: &TileGrid,
     sums: &[[f32; 4]],
     distances: usize,
@@ -146,5 +148,5 @@ fn light_at_column(
 ) -> [f32; 4] {
     let position = tiles.column_at(column);
     let left = position.index * distances;
-    segments.in_scattered(i, sums, [left, left + distances], position.fraction)
+    segments.in_scattered(i, gain, sums, [left, left + distances], position.fraction)
 }

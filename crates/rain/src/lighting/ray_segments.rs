@@ -157,9 +157,8 @@ pub(super) struct RaySegments {
     fraction: [LaneArray; 2],
     /// Optical depths of their ends.
     depths: [LaneArray; 2],
-    /// Inverse transmittance from the camera to their near ends; 0 beyond the range of lamps and where nothing is transmitted.
-    gain: LaneArray,
-    any_lit: bool,
+    /// Whether lamps light them: not beyond their range and where nothing is transmitted.
+    is_lit: [bool; LANES],
 }
 
 impl RaySegments {
@@ -167,33 +166,45 @@ impl RaySegments {
     #[inline(always)]
     pub(super) fn new(table: &OpticalDepthTable, [near, far]: &[LaneArray; 2], lit_end: f32) -> Self {
         let [mut from, mut to] = [table.locate(near), table.locate(far)];
-        let (mut gain, mut any_lit) = (ZERO_LANES, false);
+        let mut is_lit = [false; LANES];
         for i in 0..LANES {
             // Beyond the maximum optical depth nothing is visible, and the gain would overflow.
-            let is_lit = (near[i] < lit_end) & (from.depth[i] < MAX_OPTICAL_DEPTH) & (far[i] > near[i]);
-            gain[i] = if is_lit { approximations::exp(from.depth[i]) } else { 0.0 };
-            any_lit |= is_lit;
+            is_lit[i] = (near[i] < lit_end) & (from.depth[i] < MAX_OPTICAL_DEPTH) & (far[i] > near[i]);
         }
         let depths = [from.depth, to.depth];
         table.clamp_to_lit(&mut from);
         table.clamp_to_lit(&mut to);
-        Self { index: [from.index, to.index], fraction: [from.fraction, to.fraction], depths, gain, any_lit }
+        Self { index: [from.index, to.index], fraction: [from.fraction, to.fraction], depths, is_lit }
     }
 
     /// Whether lamps light any of them.
     #[inline(always)]
     pub(super) fn any_lit(&self) -> bool {
-        self.any_lit
+        let mut any = false;
+        for i in 0..LANES {
+            any |= self.is_lit[i];
+        }
+        any
     }
 
-    /// Light of lamps scattered within a segment, as seen from its near end: interpolated by `t` between two corners, whose accumulated light begins at
-    /// two indices of `sums`.
+    /// Inverse transmittance from the camera to their near ends; 0 where no lamp lights them.
     #[inline(always)]
-    pub(super) fn in_scattered(&self, i: usize, sums: &[[f32; 4]], corners: [usize; 2], t: f32) -> [f32; 4] {
+    pub(super) fn gains(&self) -> LaneArray {
+        let mut gains = ZERO_LANES;
+        for i in 0..LANES {
+            gains[i] = if self.is_lit[i] { approximations::exp(self.depths[0][i]) } else { 0.0 };
+        }
+        gains
+    }
+
+    /// Light of lamps scattered within segment `i`, as seen from its near end, with its `gain`: interpolated by `t` between two corners, whose accumulated
+    /// light begins at two indices of `sums`.
+    #[inline(always)]
+    pub(super) fn in_scattered(&self, i: usize, gain: f32, sums: &[[f32; 4]], corners: [usize; 2], t: f32) -> [f32; 4] {
         let [left, right] = [self.difference(i, sums, corners[0]), self.difference(i, sums, corners[1])];
         let mut light = [0.0; 4];
         for c in 0..4 {
-            light[c] = (right[c] - left[c]).fma(t, left[c]) * self.gain[i];
+            light[c] = (right[c] - left[c]).fma(t, left[c]) * gain;
         }
         light
     }

@@ -25,6 +25,7 @@ use super::{
     tiles::{FINE_TILE, GridPosition, TileGrid, geometric_sequence, lerp_color},
 };
 use crate::{
+    aovs::add_optical_depths,
     drops::shutter_state::ShutterState,
     lanes::{LaneArray, ZERO_LANES},
 };
@@ -59,12 +60,6 @@ pub(crate) struct SingleScattering<'a> {
     /// End of the medium without a plate, m.
     farthest: f32,
     ground: f64,
-}
-
-/// Sky light at sixteen positions: radiance of rain that scatters once, and of infinitely deep rain.
-struct SkyColors {
-    once: [LaneArray; 3],
-    endless: [LaneArray; 3],
 }
 
 impl<'a> SingleScattering<'a> {
@@ -135,16 +130,20 @@ impl<'a> SingleScattering<'a> {
             .map(|sky| lerp_color(sky[index], sky[index + columns], row.fraction))
     }
 
-    /// Sky light scattered within sixteen segments.
+    /// A component of the sky light that is scattered within sixteen segments, from that of rain that scatters `once` and of `endless` rain.
     ///
     /// Approximation of multiple scattering: rain of opacity o shows `o (1 - o)` of the sky light that is scattered once, and `o^2` of that of infinitely
     /// deep rain.
     #[inline(always)]
-    fn scattered_sky(sky: &SkyColors, rescattered: &LaneArray, opacities: &LaneArray, c: usize) -> LaneArray {
+    fn scattered_sky(
+        once: &LaneArray,
+        endless: &LaneArray,
+        rescattered: &LaneArray,
+        opacities: &LaneArray,
+    ) -> LaneArray {
         let mut light = ZERO_LANES;
         for i in 0..LANES {
-            let (once, endless) = (sky.once[c][i], sky.endless[c][i]);
-            light[i] = (endless - once).fma(rescattered[i], once).simd_max(0.0) * opacities[i];
+            light[i] = (endless[i] - once[i]).fma(rescattered[i], once[i]).simd_max(0.0) * opacities[i];
         }
         light
     }
@@ -246,16 +245,16 @@ impl<'a> SingleScattering<'a> {
         let side = self.tiles().side;
         let mut directions =
             Directions { components: [[0.0; LANES], [1.0; LANES], [0.0; LANES]], visible: [false; LANES] };
-        let mut sky = SkyColors { once: [ZERO_LANES; 3], endless: [ZERO_LANES; 3] };
+        let (mut once, mut endless) = ([ZERO_LANES; 3], [ZERO_LANES; 3]);
         for i in 0..LANES {
             let column = (first + i).min(last);
             let direction = self.view.camera.direction(DVec2::new((column * side) as f64, y as f64));
             directions.visible[i] = direction.is_some();
             let components = direction.unwrap_or(DVec3::Y).as_vec3().to_array();
-            let [once, endless] = self.sky_at(column, row);
+            let [seen_once, seen_endless] = self.sky_at(column, row);
             for c in 0..3 {
                 directions.components[c][i] = components[c];
-                (sky.once[c][i], sky.endless[c][i]) = (once[c], endless[c]);
+                (once[c][i], endless[c][i]) = (seen_once[c], seen_endless[c]);
             }
         }
         let ranges = self.bounds().ranges(&mut directions, slice, &[f32::INFINITY; LANES]);
@@ -263,13 +262,13 @@ impl<'a> SingleScattering<'a> {
         let (opacities, rescattered) = (segments.opacities(), segments.opacities_up_to_ends());
         let mut layer = [ZERO_LANES, ZERO_LANES, ZERO_LANES, opacities];
         for c in 0..3 {
-            layer[c] = Self::scattered_sky(&sky, &rescattered, &opacities, c);
+            layer[c] = Self::scattered_sky(&once[c], &endless[c], &rescattered, &opacities);
         }
         if let Some(lamps) = self.lamps.in_scattering.as_ref().filter(|_| segments.any_lit()) {
-            let stride = lamps.distances * self.tiles().size[0];
+            let (stride, gains) = (lamps.distances * self.tiles().size[0], segments.gains());
             for i in 0..LANES {
                 let above = row.index * stride + (first + i).min(last) * lamps.distances;
-                let light = segments.in_scattered(i, &lamps.sums, [above, above + stride], row.fraction);
+                let light = segments.in_scattered(i, gains[i], &lamps.sums, [above, above + stride], row.fraction);
                 for c in 0..3 {
                     layer[c][i] += light[c];
                 }
@@ -326,20 +325,20 @@ impl<'a> SingleScattering<'a> {
         let segments = RaySegments::new(&self.table, &ranges, self.end);
         let (opacities, rescattered) = (segments.opacities(), segments.opacities_up_to_ends());
         let mut layer = [ZERO_LANES, ZERO_LANES, ZERO_LANES, opacities];
-        let sky = [column, column + 1].map(|column| self.sky_at(column, row));
+        let (from, to) = (self.sky_at(column, row), self.sky_at(column + 1, row));
         for c in 0..3 {
-            let [left, right] = [0, 1].map(|side| {
-                let colors = SkyColors { once: [[sky[side][0][c]; LANES]; 3], endless: [[sky[side][1][c]; LANES]; 3] };
-                Self::scattered_sky(&colors, &rescattered, &opacities, c)
-            });
+            // Not by a closure, which would not be compiled for the features of the processor.
+            let left = Self::scattered_sky(&[from[0][c]; LANES], &[from[1][c]; LANES], &rescattered, &opacities);
+            let right = Self::scattered_sky(&[to[0][c]; LANES], &[to[1][c]; LANES], &rescattered, &opacities);
             for i in 0..LANES {
                 layer[c][i] = (right[i] - left[i]).fma(across(i), left[i]);
             }
         }
         if let Some(lamps) = self.lamps.in_scattering.as_ref().filter(|_| segments.any_lit()) {
-            let corners = [index, index + 1].map(|column| column * lamps.distances);
+            let corners = [index * lamps.distances, (index + 1) * lamps.distances];
+            let gains = segments.gains();
             for i in 0..LANES {
-                let light = segments.in_scattered(i, sums, corners, across(i));
+                let light = segments.in_scattered(i, gains[i], sums, corners, across(i));
                 for c in 0..3 {
                     layer[c][i] += light[c];
                 }
@@ -367,6 +366,7 @@ fn between(rows: &[Vec<[f32; 4]>; 2], column: usize, c: usize, down: f32) -> f32
 fn add_layer(strip: &mut Strip, first: usize, layer: &Layer, part: Range<usize>) {
     let [red, green, blue, opacity] = layer.each_ref().map(|row| &row[part.clone()]);
     strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH[..part.len()]);
+    add_optical_depths(&mut strip.aovs, first, opacity);
 }
 
 /// Adds corrections to consecutive pixels of a strip. The medium in front of them is contained in the strip's transmittance too; its effect is small.

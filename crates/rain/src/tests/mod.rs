@@ -12,6 +12,7 @@ mod shadows;
 use bansho_base::{
     camera::CameraParameters,
     image::Rect,
+    math,
     parameters::{Range, animated::Animated},
     phenomenon::{
         Prepared,
@@ -24,7 +25,7 @@ use bansho_base::{
     },
 };
 
-use super::{Method, Rain, RainParameters, RainRun, lighting::LightCaches, render::PreparedRain};
+use super::{Method, Rain, RainParameters, RainRun, aovs::AOVS, lighting::LightCaches, render::PreparedRain};
 
 pub(super) const METHODS: [Method; 2] = [Method::Billboards, Method::Drops];
 
@@ -89,7 +90,7 @@ fn draw_with(
 ) -> Strip {
     let prepared = PreparedRain::new(rain, light_caches, view, surroundings);
     let mut strip = Strip::default();
-    strip.reset(rect, None, 3);
+    strip.reset(rect, None, AOVS.len());
     prepared.draw(slice, &mut strip);
     strip
 }
@@ -209,6 +210,39 @@ fn depth_and_diameter_are_those_of_the_nearest_streak() {
             }
         }
         assert!(covered > strip.len() / 4, "{method:?}: {covered}");
+    }
+}
+
+#[test]
+fn the_optical_depth_of_the_medium_is_that_of_what_passes_between_streaks() {
+    let wind = wind([0.0; 3], 0.0);
+    let view = view_at(1.0, 0.02, [96, 54]);
+    for method in METHODS {
+        let parameters = RainParameters { airlight_distance: 800.0, opacity_gain: 20.0, ..streaks(method, 2.0) };
+        let rain = rain(parameters, 1);
+        let whole = draw(&rain, &view, &lit(&wind));
+        let depths = |strip: &Strip| -> Vec<f32> {
+            (0..strip.len()).map(|index| strip.aovs[3].resolve(index, AovRule::Sum)).collect()
+        };
+        let optical_depths = depths(&whole);
+        let mut free = 0;
+        for (index, opacity) in opacity(&whole).into_iter().enumerate() {
+            let passed = math::exp(f64::from(-optical_depths[index])) as f32;
+            assert!(optical_depths[index] > 0.01 && whole.transmittance(index)[1] < passed + 1e-5);
+            if opacity == 0.0 {
+                assert!((whole.transmittance(index)[1] - passed).abs() < 1e-5, "{method:?}: {passed}");
+                free += 1;
+            }
+        }
+        assert!(free > 20, "{method:?}: {free}");
+        // The optical depths of parts in depth add up.
+        let rect = Rect::from_size(view.size[0], view.size[1]);
+        let part = |near, far| depths(&draw_part(&rain, &view, &lit(&wind), rect, &DepthInterval { near, far }));
+        let parts = [part(0.0, 12.0), part(12.0, f64::INFINITY)];
+        for (index, whole) in optical_depths.iter().enumerate() {
+            let sum: f32 = parts.iter().map(|part| part[index]).sum();
+            assert!((sum / whole - 1.0).abs() < 3e-3, "{method:?}: {sum} {whole}");
+        }
     }
 }
 

@@ -76,8 +76,14 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
         if !mapping.covers(1, y) {
             return;
         }
-        let rows = filter_taps(mapping, 1, y);
         let row = &mut row[covered.clone()];
+        if mapping.is_identity() {
+            let own = picture.color.row(y);
+            row.iter_mut().zip(own).for_each(|(pixel, color)| *pixel = alpha.premultiplied(*color));
+            row_over_black(&view, picture.encoding, alpha, row);
+            return;
+        }
+        let rows = filter_taps(mapping, 1, y);
         for (pixel, columns) in row.iter_mut().zip(&columns[covered.clone()]) {
             let mut sum = [0.0_f32; 4];
             for row in &rows {

@@ -3,8 +3,13 @@
 //! Between near and far there is nothing, so depths of different surfaces are never mixed. On a plane the inverse of the depth is linear in the picture: the depth of a pixel is that of the nearest
 //! value, continued along its surface to the middle of the pixel. Without that, water and ground that are seen at a grazing angle would be hidden in stripes, since a third of a row is meters there.
 
-use bansho_base::{camera::Camera, host::parallel::prelude::*, image::Image, math::DVec2};
-use bansho_scene::{DepthScale, PlateDepth};
+use bansho_base::{
+    camera::{Camera, Lens},
+    host::parallel::prelude::*,
+    image::Image,
+    math::DVec2,
+};
+use bansho_scene::{DepthKind, DepthScale, PlateDepth};
 
 use super::plate_mapping::{PlateMapping, depth_of_lens};
 
@@ -78,6 +83,16 @@ pub(super) fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &Plat
     let covered = mapping.covered_columns();
     let columns: Vec<NearestValue> = covered.clone().map(|x| nearest(0, x)).collect();
     let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [f32::INFINITY]);
+    // The depth of a pixel is then that of its value, whatever the direction of the pixel.
+    let is_axis = camera.lens != Lens::Perspective || depth.scale.kind != DepthKind::Distance;
+    if is_axis && mapping.is_identity() && depth.size == mapping.plate {
+        let both = image.pixels_mut().par_chunks_mut(depth.size[0]).zip(rows.values.par_chunks(depth.size[0]));
+        both.for_each(|(pixels, values)| {
+            let both = pixels.iter_mut().zip(values);
+            both.for_each(|(pixel, value)| pixel[0] = depth.scale.meters_of(*value) as f32);
+        });
+        return image;
+    }
     image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, pixels)| {
         if !mapping.covers(1, y) {
             return;

@@ -48,6 +48,11 @@ impl PlateMapping {
         (0.0..=self.plate[axis] as f64).contains(&self.plate_position(axis, pixel))
     }
 
+    /// Whether the pixels of the plate are those of the picture.
+    pub(super) fn is_identity(&self) -> bool {
+        self.picture == self.plate && self.overscan == 0 && self.scale == 1.0 && self.offset == [0.0; 2]
+    }
+
     /// The columns of the picture that the plate covers.
     pub(super) fn covered_columns(&self) -> Range<usize> {
         let covers = |x: &usize| self.covers(0, *x);
@@ -100,6 +105,8 @@ mod tests {
         for pixel in 0..4 {
             assert_eq!(filter_taps(&mapping, 0, pixel), [FilterTap { pixel, weight: 1.0 }]);
         }
+        assert!(mapping.is_identity());
+        assert!(!PlateMapping { overscan: 1, ..mapping }.is_identity());
     }
 
     #[test]

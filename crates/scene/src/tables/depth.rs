@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use bansho_base::host::parallel::prelude::*;
+
 use super::picture::DepthKind;
 
 /// From the values of a depth to meters.
@@ -47,22 +49,48 @@ pub struct DepthValues {
 }
 
 impl DepthValues {
+    /// Counts values, in parallel.
     pub(super) fn of(values: &[f32]) -> Self {
-        let (mut counts, mut range) = (Self::default(), [f32::INFINITY, f32::NEG_INFINITY]);
+        const CHUNK: usize = 1 << 15;
+        let chunks: Vec<Self> = values.par_chunks(CHUNK).map(Self::of_chunk).collect();
+        let all = chunks.into_iter().fold(Self::NONE, |all, chunk| Self {
+            positive: all.positive + chunk.positive,
+            negative: all.negative + chunk.negative,
+            zero: all.zero + chunk.zero,
+            infinite: all.infinite + chunk.infinite,
+            not_a_number: all.not_a_number + chunk.not_a_number,
+            range: [all.range[0].min(chunk.range[0]), all.range[1].max(chunk.range[1])],
+        });
+        if all.positive + all.negative > 0 { all } else { Self { range: [0.0; 2], ..all } }
+    }
+
+    /// No values: the range contains nothing.
+    const NONE: Self = Self {
+        positive: 0,
+        negative: 0,
+        zero: 0,
+        infinite: 0,
+        not_a_number: 0,
+        range: [f32::INFINITY, f32::NEG_INFINITY],
+    };
+
+    fn of_chunk(values: &[f32]) -> Self {
+        let (mut positive, mut negative, mut zero, mut infinite) = (0_u32, 0_u32, 0_u32, 0_u32);
+        let mut range = Self::NONE.range;
+        // Without branches, so that it is vectorized.
         for &value in values {
-            if value.is_nan() {
-                counts.not_a_number += 1;
-            } else if value.is_infinite() {
-                counts.infinite += 1;
-            } else if value == 0.0 {
-                counts.zero += 1;
-            } else {
-                counts.positive += usize::from(value > 0.0);
-                counts.negative += usize::from(value < 0.0);
-                range = [range[0].min(value), range[1].max(value)];
-            }
+            let is_counted = value.is_finite() & (value != 0.0);
+            positive += u32::from(is_counted & (value > 0.0));
+            negative += u32::from(is_counted & (value < 0.0));
+            zero += u32::from(value == 0.0);
+            infinite += u32::from(value.is_infinite());
+            let [low, high] = if is_counted { [value; 2] } else { Self::NONE.range };
+            range[0] = if low < range[0] { low } else { range[0] };
+            range[1] = if high > range[1] { high } else { range[1] };
         }
-        if counts.positive + counts.negative > 0 { Self { range, ..counts } } else { counts }
+        let [positive, negative, zero, infinite] = [positive, negative, zero, infinite].map(|count| count as usize);
+        let not_a_number = values.len() - positive - negative - zero - infinite;
+        Self { positive, negative, zero, infinite, not_a_number, range }
     }
 
     /// Whether they are z in the space of a camera that looks toward -z: all that are finite are negative.
