@@ -15,6 +15,7 @@ import subprocess
 from pathlib import Path
 
 import maturin
+from bansho_notices import write_notices
 from maturin import (
     get_requires_for_build_editable,
     get_requires_for_build_sdist,
@@ -23,7 +24,6 @@ from maturin import (
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "program" / "scripts"
-NOTICES = ROOT / "THIRD-PARTY-NOTICES.txt"
 
 
 def _add_program() -> None:
@@ -41,40 +41,16 @@ def _add_program() -> None:
     shutil.copy2(given, SCRIPTS / name)
 
 
-def _write_notices() -> None:
-    """Collects the license files of all crates that are compiled into the wheel."""
-    command = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", _host()]
-    metadata = json.loads(subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout)
-    parts = ["The compiled part of this package contains the following crates.\n"]
-    for package in sorted(metadata["packages"], key=lambda package: (package["name"], package["version"])):
-        if package["source"] is None:
-            continue
-        parts.append(f"\n{'=' * 80}\n{package['name']} {package['version']}: {package['license'] or 'see its license file'}\n{package['repository'] or ''}\n")
-        folder = Path(package["manifest_path"]).parent
-        files = [path for path in sorted(folder.iterdir()) if path.is_file() and path.name.upper().startswith(("LICEN", "COPYING", "NOTICE", "UNLICENSE"))]
-        parts += [f"\n--- {path.name}\n{path.read_text(encoding='utf-8', errors='replace')}" for path in files]
-    NOTICES.write_text("".join(parts), encoding="utf-8")
-
-
-def _host() -> str:
-    """The target that is built for."""
-    target = os.environ.get("CARGO_BUILD_TARGET")
-    if target:
-        return target
-    said = subprocess.run(["rustc", "-vV"], check=True, stdout=subprocess.PIPE, text=True).stdout
-    return next(line.removeprefix("host: ") for line in said.splitlines() if line.startswith("host: "))
-
-
 def _prepare() -> None:
     _add_program()
-    _write_notices()
+    write_notices()
     profile = os.environ.get("BANSHO_PROFILE")
     if profile:
         os.environ["MATURIN_PEP517_ARGS"] = f"{os.environ.get('MATURIN_PEP517_ARGS', '')} --profile={profile}".strip()
 
 
 def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
-    _write_notices()
+    write_notices()
     SCRIPTS.mkdir(parents=True, exist_ok=True)
     return maturin.prepare_metadata_for_build_wheel(metadata_directory, config_settings)
 

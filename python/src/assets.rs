@@ -21,7 +21,7 @@ use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::error;
+use crate::{error, work};
 
 /// Numbers of arrays: no two have the same, so that a picture that was put in place of another is never taken for it.
 static NEXT_NUMBER: AtomicU64 = AtomicU64::new(1);
@@ -162,12 +162,6 @@ impl Assets for ArrayAssets {
     }
 }
 
-/// A picture of sRGB codes, height x width x 3 or 4; alpha is straight and blends encoded values.
-pub(crate) fn picture_of_codes(codes: &PyReadonlyArray3<u8>) -> PyResult<Picture> {
-    let (shape, codes) = codes_of(codes)?;
-    picture(shape, pixels_of_codes(shape, codes), Encoding::DisplaySrgb)
-}
-
 /// The shape and the codes of an array of codes.
 pub(crate) fn codes_of<'a>(codes: &'a PyReadonlyArray3<u8>) -> PyResult<(Shape, &'a [u8])> {
     Ok((checked_shape(codes.shape())?, contiguous(codes.as_slice())?))
@@ -185,22 +179,15 @@ pub(crate) fn pixels_of_codes(shape: Shape, codes: &[u8]) -> Vec<[f32; 4]> {
         }
         values
     };
-    let [height, width] = [shape.height, shape.width];
-    let mut pixels = vec![[0.0; 4]; height * width];
-    let rows = pixels.par_chunks_mut(width).zip(codes.par_chunks(width * shape.channels));
-    rows.for_each(|(pixels, codes)| match shape.channels {
+    match shape.channels {
         3 => {
-            for (pixel, &[r, g, b]) in pixels.iter_mut().zip(codes.as_chunks::<3>().0) {
-                *pixel = [VALUES[usize::from(r)], VALUES[usize::from(g)], VALUES[usize::from(b)], 1.0];
-            }
+            let pixels = codes.as_chunks::<3>().0.par_iter();
+            pixels
+                .map(|&[r, g, b]| [VALUES[usize::from(r)], VALUES[usize::from(g)], VALUES[usize::from(b)], 1.0])
+                .collect()
         }
-        _ => {
-            for (pixel, &rgba) in pixels.iter_mut().zip(codes.as_chunks::<4>().0) {
-                *pixel = rgba.map(|code| VALUES[usize::from(code)]);
-            }
-        }
-    });
-    pixels
+        _ => codes.as_chunks::<4>().0.par_iter().map(|rgba| rgba.map(|code| VALUES[usize::from(code)])).collect(),
+    }
 }
 
 /// A picture of floats, height x width x 3 or 4. Alpha of linear light is associated, else straight.
@@ -229,17 +216,19 @@ pub(crate) fn picture(shape: Shape, pixels: Vec<[f32; 4]>, encoding: Encoding) -
     Ok(picture)
 }
 
-/// A depth, height x width. Infinity and 0 are infinitely far away.
-pub(crate) fn depth_map(depth: &PyReadonlyArray2<f32>) -> PyResult<DepthMap> {
-    let (shape, values) = (depth.shape(), contiguous(depth.as_slice())?);
-    if values.iter().any(|value| value.is_nan()) {
-        let allowed = "numbers, and infinity or 0 where the depth is unknown or infinite";
-        return Err(error::value(format!("a depth with the value NaN; allowed: {allowed}")));
+/// The size (width, height) and the values of an array of depths.
+pub(crate) fn depths_of<'a>(depth: &'a PyReadonlyArray2<f32>) -> PyResult<([usize; 2], &'a [f32])> {
+    let shape = depth.shape();
+    Ok(([shape[1], shape[0]], contiguous(depth.as_slice())?))
+}
+
+/// A depth in rows, in the pool of the caller. Infinity and 0 are infinitely far away.
+pub(crate) fn depth_map(([width, height], values): ([usize; 2], &[f32])) -> PyResult<DepthMap> {
+    if let Some(unusable) = values.par_iter().find_first(|value| value.is_nan() || **value < 0.0) {
+        let allowed = "0 or more, and infinity or 0 where the depth is unknown or infinite";
+        return Err(error::value(format!("a depth with the value {unusable}; allowed: {allowed}")));
     }
-    if let Some(negative) = values.iter().find(|value| **value < 0.0) {
-        return Err(error::value(format!("a depth with the value {negative}; allowed: 0 or more")));
-    }
-    let image = Image::from_pixels(shape[1], shape[0], values.iter().map(|&value| [value]).collect());
+    let image = Image::from_pixels(width, height, values.par_iter().map(|&value| [value]).collect());
     let values = image.filter(|image| !image.pixels().is_empty());
     let values = values.ok_or_else(|| error::value("a depth without pixels".to_owned()))?;
     Ok(DepthMap { values, remarks: Vec::new() })
@@ -286,8 +275,10 @@ impl Arrays {
     }
 
     /// Pictures of sRGB codes.
-    fn set_codes(&self, name: &str, frames: Vec<PyReadonlyArray3<u8>>) -> PyResult<()> {
-        let pictures = frames.iter().map(picture_of_codes).collect::<PyResult<_>>()?;
+    fn set_codes(&self, py: Python<'_>, name: &str, frames: Vec<PyReadonlyArray3<u8>>) -> PyResult<()> {
+        let frames = frames.iter().map(codes_of).collect::<PyResult<Vec<_>>>()?;
+        let convert = |(shape, codes)| picture(shape, pixels_of_codes(shape, codes), Encoding::DisplaySrgb);
+        let pictures = work::run(py, 1, |_| frames.into_iter().map(convert).collect::<PyResult<_>>())??;
         self.assets.set_pictures(name, pictures);
         Ok(())
     }
@@ -306,8 +297,9 @@ impl Arrays {
     }
 
     /// Depths.
-    fn set_depths(&self, name: &str, frames: Vec<PyReadonlyArray2<f32>>) -> PyResult<()> {
-        let depths = frames.iter().map(depth_map).collect::<PyResult<_>>()?;
+    fn set_depths(&self, py: Python<'_>, name: &str, frames: Vec<PyReadonlyArray2<f32>>) -> PyResult<()> {
+        let frames = frames.iter().map(depths_of).collect::<PyResult<Vec<_>>>()?;
+        let depths = work::run(py, 1, |_| frames.into_iter().map(depth_map).collect::<PyResult<_>>())??;
         self.assets.set_depths(name, depths);
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! An effect that follows a program's time and writes into the program's arrays.
 
-use std::sync::Mutex;
+use std::sync::Arc;
 
 use bansho::{
     AlphaMode, Animated, CameraParameters, ColorSpace, EffectError, LiveEffect, Picture, View,
@@ -14,7 +14,7 @@ use crate::{assets::Arrays, error, frame, scene, shot, value, work};
 /// A live effect: `bansho.Effect` is the class that users see.
 #[pyclass(module = "bansho._bansho", frozen)]
 pub(crate) struct Effect {
-    live: Mutex<LiveEffect>,
+    live: work::Exclusive<LiveEffect>,
     threads: usize,
 }
 
@@ -22,7 +22,6 @@ pub(crate) struct Effect {
 enum Failure {
     Effect(EffectError),
     Other(String),
-    Poisoned(work::Poisoned),
 }
 
 impl<E: Into<EffectError>> From<E> for Failure {
@@ -36,7 +35,6 @@ impl From<Failure> for PyErr {
         match failure {
             Failure::Effect(reason) => error::effect(&reason),
             Failure::Other(message) => error::value(message),
-            Failure::Poisoned(poisoned) => poisoned.into(),
         }
     }
 }
@@ -47,9 +45,9 @@ impl Effect {
         py: Python<'_>,
         work: impl FnOnce(&mut LiveEffect) -> Result<R, Failure> + Send,
     ) -> PyResult<R> {
-        let done = work::run(py, self.threads, |_| {
-            let mut live = work::lock(&self.live).map_err(Failure::Poisoned)?;
-            work(&mut live)
+        let done = self.live.run(py, self.threads, |live, interruption| {
+            live.set_observer(Arc::new(interruption.clone()));
+            work(live)
         })?;
         Ok(done?)
     }
@@ -119,8 +117,9 @@ impl Effect {
         if let Some(steps) = max_steps {
             effect = effect.max_steps(steps);
         }
-        let live = work::run(py, threads, |_| effect.open())?.map_err(|refused| error::effect(&refused))?;
-        Ok(Self { live: Mutex::new(live), threads })
+        let opened = work::run(py, threads, |interruption| effect.observer(Arc::new(interruption.clone())).open())?;
+        let live = opened.map_err(|refused| error::effect(&refused))?;
+        Ok(Self { live: work::Exclusive::new(live), threads })
     }
 
     fn advance(&self, py: Python<'_>, dt: f64) -> PyResult<f64> {
@@ -245,28 +244,28 @@ impl Effect {
     }
 
     #[getter]
-    fn time(&self) -> PyResult<f64> {
-        Ok(work::lock(&self.live)?.time())
+    fn time(&self, py: Python<'_>) -> PyResult<f64> {
+        self.live.read(py, LiveEffect::time)
     }
 
     #[getter]
-    fn owed_s(&self) -> PyResult<f64> {
-        Ok(work::lock(&self.live)?.owed_s())
+    fn owed_s(&self, py: Python<'_>) -> PyResult<f64> {
+        self.live.read(py, LiveEffect::owed_s)
     }
 
     #[getter]
-    fn size(&self) -> PyResult<[usize; 2]> {
-        Ok(work::lock(&self.live)?.size())
+    fn size(&self, py: Python<'_>) -> PyResult<[usize; 2]> {
+        self.live.read(py, LiveEffect::size)
     }
 
     #[getter]
-    fn wind(&self) -> PyResult<([f64; 3], f64)> {
-        Ok(work::lock(&self.live)?.wind())
+    fn wind(&self, py: Python<'_>) -> PyResult<([f64; 3], f64)> {
+        self.live.read(py, LiveEffect::wind)
     }
 
     #[getter]
-    fn is_simulated(&self) -> PyResult<bool> {
-        Ok(work::lock(&self.live)?.is_simulated())
+    fn is_simulated(&self, py: Python<'_>) -> PyResult<bool> {
+        self.live.read(py, LiveEffect::is_simulated)
     }
 }
 

@@ -1,9 +1,6 @@
 //! Weather over single pictures: one frame of a small scene over a plate that is an array. What does not depend on the picture is kept from call to call.
 
-use std::{
-    path::PathBuf,
-    sync::{Arc, Mutex},
-};
+use std::{path::PathBuf, sync::Arc};
 
 use bansho::{
     ColorSpace, CompiledScene, DisplayImage, DisplayOptions, Frame, Plan, PlanOptions, RenderError, Scene, SceneLinear,
@@ -31,7 +28,7 @@ const DEPTH: &str = "depth";
 /// Draws scenes over pictures of the same size, one after the other.
 #[pyclass(module = "bansho._bansho", frozen)]
 pub(crate) struct PlateShot {
-    state: Mutex<State>,
+    state: work::Exclusive<State>,
     threads: usize,
 }
 
@@ -81,7 +78,6 @@ enum Failure {
     Scene(bansho::SceneError),
     Plan(bansho::PlanError),
     Render(RenderError),
-    Poisoned(work::Poisoned),
     Exception(PyErr),
 }
 
@@ -91,7 +87,6 @@ impl From<Failure> for PyErr {
             Failure::Scene(problems) => error::scene(&problems),
             Failure::Plan(reason) => error::plan(&reason),
             Failure::Render(reason) => error::render(&reason),
-            Failure::Poisoned(poisoned) => poisoned.into(),
             Failure::Exception(exception) => exception,
         }
     }
@@ -162,7 +157,7 @@ impl PlateShot {
     #[new]
     fn new(threads: Option<i64>) -> PyResult<Self> {
         let assets = Arc::new(ArrayAssets::new(PathBuf::new(), 0));
-        Ok(Self { state: Mutex::new(State { assets, shot: None }), threads: work::thread_count(threads)? })
+        Ok(Self { state: work::Exclusive::new(State { assets, shot: None }), threads: work::thread_count(threads)? })
     }
 
     /// Draws frame `number` of the scene `text`, whose plate is `image` with `depth`. Codes (sRGB) become codes, floats (`encoding`) linear sRGB. With `truth`
@@ -184,11 +179,11 @@ impl PlateShot {
             Pixels::Codes(codes) => Source::Codes(assets::codes_of(codes)?),
             Pixels::Floats(values) => Source::Picture(assets::picture_of_floats(values, encoding)?),
         };
-        let depth = depth.as_ref().map(assets::depth_map).transpose()?;
+        let depth = depth.as_ref().map(assets::depths_of).transpose()?;
         let frame = [number, i64::from(truth)];
-        let drawn = work::run(py, self.threads, |observer| {
-            let mut state = work::lock(&self.state).map_err(Failure::Poisoned)?;
+        let drawn = self.state.run(py, self.threads, |state, observer| {
             let image = image.picture().map_err(Failure::Exception)?;
+            let depth = depth.map(assets::depth_map).transpose().map_err(Failure::Exception)?;
             let drawn = state.draw(scene, text, Plate { image, depth }, frame, observer)?;
             Ok::<Converted, Failure>(Converted::of(drawn))
         })??;

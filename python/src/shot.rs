@@ -1,6 +1,6 @@
 //! A shot of a scene: its frames as light and as display codes, and what is in them as data.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use bansho::{
     BitDepth, CompiledScene, DisplayOptions, GlareUse, Plan, PlanOptions, Rect, RenderError, SceneLinear, SceneOptions,
@@ -13,7 +13,7 @@ use crate::{assets::Arrays, error, frame, scene, work};
 /// A shot: `bansho.Shot` is the class that users see.
 #[pyclass(module = "bansho._bansho", frozen)]
 pub(crate) struct Shot {
-    shot: Mutex<bansho::Shot>,
+    shot: work::Exclusive<bansho::Shot>,
     /// The plan of light, as for EXR files.
     light: Arc<Plan>,
     /// The plan of display codes, as for PNG files.
@@ -22,33 +22,6 @@ pub(crate) struct Shot {
     /// Name, unit and description of each AOV that the phenomena have.
     aovs: Vec<(String, &'static str, &'static str)>,
     threads: usize,
-}
-
-/// What is done with a shot under its lock fails for a reason of its own, or because an earlier call panicked.
-enum Failure {
-    Render(RenderError),
-    Poisoned(work::Poisoned),
-}
-
-impl From<RenderError> for Failure {
-    fn from(error: RenderError) -> Self {
-        Self::Render(error)
-    }
-}
-
-impl From<work::Poisoned> for Failure {
-    fn from(poisoned: work::Poisoned) -> Self {
-        Self::Poisoned(poisoned)
-    }
-}
-
-impl From<Failure> for PyErr {
-    fn from(failure: Failure) -> Self {
-        match failure {
-            Failure::Render(render) => error::render(&render),
-            Failure::Poisoned(poisoned) => poisoned.into(),
-        }
-    }
 }
 
 impl Shot {
@@ -60,15 +33,14 @@ impl Shot {
         plan: &Arc<Plan>,
         draw: impl FnOnce(&mut bansho::Shot, &work::Interruption) -> Result<R, RenderError> + Send,
     ) -> PyResult<R> {
-        let done = work::run(py, self.threads, |interruption| {
-            let mut shot = work::lock(&self.shot)?;
+        let done = self.shot.run(py, self.threads, |shot, interruption| {
             if !Arc::ptr_eq(shot.plan(), plan) {
                 shot.replace_plan(plan.clone());
             }
             shot.advance(number, interruption)?;
-            Ok::<R, Failure>(draw(&mut shot, interruption)?)
+            draw(shot, interruption)
         })?;
-        Ok(done?)
+        done.map_err(|failed| error::render(&failed))
     }
 }
 
@@ -106,10 +78,10 @@ impl Shot {
         let glare = if view == View::RAW { GlareUse::Stated } else { GlareUse::Always };
         let of_display = PlanOptions { size, crop, glare, display: Some(view), ..PlanOptions::default() };
         let assets = arrays.assets();
-        let built = work::run(py, threads, |_| {
+        let built = work::run(py, threads, |interruption| {
             let compiled = CompiledScene::build(Arc::new(scene), assets, None);
             let compiled = Arc::new(compiled.map_err(|errors| errors.located(name, text)).map_err(Refusal::Scene)?);
-            let mut light = Plan::new(&compiled, &of_light).map_err(Refusal::Plan)?;
+            let mut light = Plan::observed(&compiled, &of_light, interruption).map_err(Refusal::Plan)?;
             light.fingerprint_frames = false;
             let (exposure, start) = (light.exposure_ev100, light.loop_start);
             let finished = Plan::with_exposure_and_loop_start(light.scene().clone(), &of_display, exposure, start);
@@ -127,7 +99,7 @@ impl Shot {
             let info = phenomenon.info();
             aovs.extend(info.aovs.iter().map(|aov| (format!("{}.{}", info.name, aov.name), aov.unit, aov.doc)));
         }
-        let shot = Mutex::new(bansho::Shot::open(compiled, light.clone()));
+        let shot = work::Exclusive::new(bansho::Shot::open(compiled, light.clone()));
         Ok(Self { shot, light, finished, is_stepped, aovs, threads })
     }
 

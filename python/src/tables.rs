@@ -47,7 +47,20 @@ fn parameter<'py>(py: Python<'py>, descriptor: &Descriptor) -> PyResult<Bound<'p
     let default = descriptor.default.as_ref().map(|default| value::to_python(py, default)).transpose()?;
     dictionary.set_item("default", default)?;
     dictionary.set_item("choices", choices(&descriptor.kind))?;
+    let inner = inner_table(&descriptor.kind).map(|table| described(py, table)).transpose()?;
+    dictionary.set_item("table", inner)?;
+    dictionary.set_item("is_list", matches!(descriptor.kind, Kind::List { .. }))?;
     Ok(dictionary)
+}
+
+/// The table that a parameter is, or a list of which.
+fn inner_table(kind: &Kind) -> Option<&'static TableDescriptor> {
+    match kind {
+        Kind::Table(descriptor) => Some(descriptor()),
+        Kind::Animated(inner) | Kind::Optional(inner) | Kind::Auto(inner) => inner_table(inner),
+        Kind::List { item, .. } => inner_table(item),
+        _ => None,
+    }
 }
 
 /// The names of a choice, each with its description.

@@ -5,7 +5,7 @@ use std::{
     collections::BTreeMap,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError, TryLockError,
         atomic::{AtomicBool, Ordering},
         mpsc::{self, RecvTimeoutError},
     },
@@ -20,6 +20,8 @@ use crate::error;
 
 /// Time between two looks at the signals of the process.
 const POLL: Duration = Duration::from_millis(25);
+/// Time between two attempts to take what another thread uses.
+const RETRY: Duration = Duration::from_millis(1);
 
 /// The largest number of threads that may be asked for.
 const MOST_THREADS: usize = 1024;
@@ -27,10 +29,10 @@ const MOST_THREADS: usize = 1024;
 /// Pools by process and number of threads. The threads of a pool do not survive a fork, so a child process makes pools of its own.
 static POOLS: Mutex<BTreeMap<(u32, usize), Arc<ThreadPool>>> = Mutex::new(BTreeMap::new());
 
-/// Asks the work to stop once a signal has come.
-#[derive(Default)]
+/// Asks the work to stop once a signal has come. Copies are the same request.
+#[derive(Clone, Default)]
 pub(crate) struct Interruption {
-    is_requested: AtomicBool,
+    is_requested: Arc<AtomicBool>,
 }
 
 impl Observer for Interruption {
@@ -89,64 +91,130 @@ pub(crate) fn run_and_poll<R: Send>(
     work: impl FnOnce(&Interruption) -> R + Send,
 ) -> PyResult<R> {
     let pool = pool(threads)?;
+    let done = py.detach(|| in_pool(&pool, &poll, work))?;
+    poll(py)?;
+    Ok(done)
+}
+
+/// Why work has no result.
+enum Failure {
+    /// A signal handler or the poll raised an exception.
+    Raised(PyErr),
+    /// The work panicked, and what it was changing may be in pieces.
+    Panicked(PyErr),
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Raised(exception) | Failure::Panicked(exception) => exception,
+        }
+    }
+}
+
+/// Does `work` in a pool and waits for it, on a thread that does not hold the interpreter.
+fn in_pool<R: Send>(
+    pool: &ThreadPool,
+    poll: &(impl Fn(Python<'_>) -> PyResult<()> + Send + Sync),
+    work: impl FnOnce(&Interruption) -> R + Send,
+) -> Result<R, Failure> {
     let interruption = Interruption::default();
-    let (outcome, raised) = py.detach(|| {
-        let (sender, receiver) = mpsc::channel();
-        pool.in_place_scope(|scope| {
-            let interruption = &interruption;
-            scope.spawn(move |_| {
-                // What the work was changing is never used after a panic: it is behind a lock, which a panic poisons.
-                let outcome = catch_unwind(AssertUnwindSafe(|| work(interruption)));
-                // The receiver outlives the scope.
-                let _ = sender.send(outcome);
-            });
-            let mut raised = None;
-            loop {
-                match receiver.recv_timeout(POLL) {
-                    Ok(outcome) => return (Some(outcome), raised),
-                    Err(RecvTimeoutError::Disconnected) => return (None, raised),
-                    Err(RecvTimeoutError::Timeout) if raised.is_some() => {}
-                    Err(RecvTimeoutError::Timeout) => {
-                        let handled = Python::attach(|py| py.check_signals().and_then(|()| poll(py)));
-                        if let Err(exception) = handled {
-                            interruption.is_requested.store(true, Ordering::Relaxed);
-                            raised = Some(exception);
-                        }
+    let (sender, receiver) = mpsc::channel();
+    let (outcome, raised) = pool.in_place_scope(|scope| {
+        let interruption = &interruption;
+        scope.spawn(move |_| {
+            // What the work was changing is never used after a panic: see `Exclusive`.
+            let outcome = catch_unwind(AssertUnwindSafe(|| work(interruption)));
+            // The receiver outlives the scope.
+            let _ = sender.send(outcome);
+        });
+        let mut raised = None;
+        loop {
+            match receiver.recv_timeout(POLL) {
+                Ok(outcome) => return (Some(outcome), raised),
+                Err(RecvTimeoutError::Disconnected) => return (None, raised),
+                Err(RecvTimeoutError::Timeout) if raised.is_some() => {}
+                Err(RecvTimeoutError::Timeout) => {
+                    let handled = Python::attach(|py| py.check_signals().and_then(|()| poll(py)));
+                    if let Err(exception) = handled {
+                        interruption.is_requested.store(true, Ordering::Relaxed);
+                        raised = Some(exception);
                     }
                 }
             }
-        })
-    });
-    if let Some(exception) = raised {
-        return Err(exception);
-    }
-    match outcome {
-        Some(Ok(done)) => {
-            poll(py)?;
-            Ok(done)
         }
-        Some(Err(payload)) => Err(error::internal(message_of(payload.as_ref()))),
-        None => Err(error::internal("a thread ended before its work was done".to_owned())),
+    });
+    match (outcome, raised) {
+        (Some(Err(payload)), _) => Err(Failure::Panicked(error::internal(message_of(payload.as_ref())))),
+        (_, Some(exception)) => Err(Failure::Raised(exception)),
+        (Some(Ok(done)), None) => Ok(done),
+        (None, None) => Err(Failure::Panicked(error::internal("a thread ended before its work was done".to_owned()))),
     }
 }
 
-/// Locks what an earlier call may have left in pieces.
+/// What calls from several threads use one after the other, and none after a panic, which may have left it in pieces.
 ///
-/// # Errors
-/// `InternalError` after a panic: what was locked then is of no use any more.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, Poisoned> {
-    mutex.lock().map_err(|_| Poisoned)
+/// The thread that calls takes it before its work enters the pool. A worker that took it within a job could wait there for itself: while it waits for the
+/// parts of one job, it takes on others.
+pub(crate) struct Exclusive<T>(Mutex<Option<T>>);
+
+impl<T: Send> Exclusive<T> {
+    pub(crate) fn new(value: T) -> Self {
+        Self(Mutex::new(Some(value)))
+    }
+
+    /// Does `work` with it in a pool of `threads`, as [`run`].
+    ///
+    /// # Errors
+    /// As [`run`]; `InternalError` after a panic of an earlier call.
+    pub(crate) fn run<R: Send>(
+        &self,
+        py: Python<'_>,
+        threads: usize,
+        work: impl FnOnce(&mut T, &Interruption) -> R + Send,
+    ) -> PyResult<R> {
+        let pool = pool(threads)?;
+        py.detach(|| {
+            let mut guard = self.take()?;
+            let value = guard.as_mut().ok_or_else(broken)?;
+            let done = in_pool(&pool, &|_| Ok(()), |interruption| work(value, interruption));
+            if let Err(Failure::Panicked(_)) = done {
+                *guard = None;
+            }
+            Ok(done?)
+        })
+    }
+
+    /// Reads from it, on this thread.
+    ///
+    /// # Errors
+    /// `InternalError` after a panic of an earlier call; the exception of a signal handler.
+    pub(crate) fn read<R: Send>(&self, py: Python<'_>, read: impl FnOnce(&T) -> R + Send) -> PyResult<R> {
+        // Without the interpreter, which the thread that uses it may wait for.
+        py.detach(|| Ok(read(self.take()?.as_ref().ok_or_else(broken)?)))
+    }
+
+    /// Waits until no other thread uses it; signals are handled meanwhile.
+    fn take(&self) -> PyResult<MutexGuard<'_, Option<T>>> {
+        let mut waited = Duration::ZERO;
+        loop {
+            match self.0.try_lock() {
+                Ok(guard) => return Ok(guard),
+                Err(TryLockError::Poisoned(poisoned)) => return Ok(poisoned.into_inner()),
+                Err(TryLockError::WouldBlock) => std::thread::sleep(RETRY),
+            }
+            waited += RETRY;
+            if waited >= POLL {
+                waited = Duration::ZERO;
+                Python::attach(|py| py.check_signals())?;
+            }
+        }
+    }
 }
 
 /// An earlier call panicked.
-#[derive(Clone, Copy, Debug, thiserror::Error)]
-#[error("an earlier call on this object failed within Bansho; open it again")]
-pub(crate) struct Poisoned;
-
-impl From<Poisoned> for PyErr {
-    fn from(poisoned: Poisoned) -> Self {
-        error::internal(poisoned.to_string())
-    }
+fn broken() -> PyErr {
+    error::internal("an earlier call on this object failed within Bansho; open it again".to_owned())
 }
 
 /// What a panic says.

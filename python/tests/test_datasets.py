@@ -1,12 +1,10 @@
-"""Data sets, transforms and labels."""
-
-import json
+"""Data sets."""
 
 import numpy as np
 import pytest
 
 import bansho
-from bansho import datasets, labels, transforms
+from bansho import datasets
 
 
 @pytest.fixture(scope="module")
@@ -53,77 +51,3 @@ def test_all_sky_auroras_have_kilorayleighs():
     column = bansho.aurora_emission(item["energy_ev"], item["flux_mw_per_m2"])
     green = column.kilorayleigh[abs(column.wavelength_nm - 557.7) < 0.5][0]
     assert 0.05 * green < item["kilorayleigh_557"].max() < 40 * green
-
-
-def test_a_transform_takes_and_returns_named_arrays(photograph):
-    transform = transforms.Rain(rate_mm_per_h=(5, 50), seed=1)
-    depth = np.full((180, 320), 30.0, np.float32)
-    result = transform(image=photograph, depth=depth, mask="kept")
-    assert result["mask"] == "kept" and result["depth"] is depth and result["image"].shape == photograph.shape
-    assert not np.array_equal(transform(image=photograph, depth=depth)["image"], result["image"]), "another call"
-    again = transforms.Rain(rate_mm_per_h=(5, 50), seed=1)(image=photograph, depth=depth)
-    assert np.array_equal(again["image"], result["image"])
-    assert transforms.Rain(p=0.0)(image=photograph)["image"] is photograph
-    assert transforms.Fog((20, 50))(image=photograph, depth=depth)["image"].std() < photograph.std()
-    with pytest.raises(ValueError, match="rate_mm_per_h: .*allowed: a number, or"):
-        transforms.Rain(rate_mm_per_h=(50, 5))
-
-
-def test_it_works_in_a_pipeline_of_albumentations(photograph):
-    albumentations = pytest.importorskip("albumentations")
-    rain = transforms.Rain(rate_mm_per_h=(20, 20)).as_albumentations()
-    pipeline = albumentations.Compose([albumentations.HorizontalFlip(p=1.0), rain], seed=3)
-    result = pipeline(image=photograph)["image"]
-    assert result.shape == photograph.shape and not np.array_equal(result, photograph[:, ::-1])
-
-
-def test_parts_of_a_mask_are_boxes():
-    mask = np.zeros((6, 8), bool)
-    mask[0, 0] = mask[1, 1] = mask[2, 0] = True
-    mask[3:6, 4:7] = True
-    mask[4, 5] = False
-    assert labels.boxes(mask) == [labels.Box(4, 3, 3, 3, 8), labels.Box(0, 0, 2, 3, 3)]
-    assert labels.boxes(mask, min_area=4) == [labels.Box(4, 3, 3, 3, 8)]
-    assert labels.yolo({"rain": mask}, min_area=4) == "2 0.687500 0.750000 0.375000 0.500000\n"
-    record = labels.coco([("a.png", {"fire": mask})])
-    assert json.loads(json.dumps(record)) == record
-    decoded = np.zeros(mask.size, bool)
-    for annotation in record["annotations"]:
-        ends = np.cumsum(annotation["segmentation"]["counts"])
-        part = np.zeros(mask.size, bool)
-        for start, end in zip(ends[::2], ends[1::2], strict=False):
-            part[start:end] = True
-        assert part.sum() == annotation["area"]
-        decoded |= part
-    assert np.array_equal(decoded.reshape(mask.shape, order="F"), mask)
-
-
-def test_every_part_is_found_whatever_its_form():
-    random = np.random.default_rng(0)
-    for _ in range(20):
-        mask = random.random((23, 31)) < 0.4
-        todo = {(int(y), int(x)) for y, x in zip(*np.nonzero(mask), strict=True)}
-        areas = []
-        while todo:
-            stack, area = [todo.pop()], 0
-            while stack:
-                y, x = stack.pop()
-                area += 1
-                near = {(y + dy, x + dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)} & todo
-                todo -= near
-                stack.extend(near)
-            areas.append(area)
-        assert sorted(areas, reverse=True) == [box.area for box in labels.boxes(mask)]
-
-
-def test_fire_and_rain_are_labeled():
-    scene = bansho.Scene([bansho.Picture(size=(96, 64)), bansho.FlameSheet(smoke={"optical_depth": 1.0}), bansho.Rain(rate_mm_per_h=50)])
-    frame = bansho.open(scene, aovs=True).render(3)
-    fire = labels.mask(frame, "fire")
-    assert fire.any() and (np.asarray(frame.aovs["flame_sheet.temperature_k"])[fire] >= 800).all()
-    assert labels.mask(frame, "rain", 0.001).sum() > labels.mask(frame, "rain", 0.01).sum()
-    assert not (labels.mask(frame, "smoke") & fire).any()
-    with pytest.raises(ValueError, match="category: 'snow'; allowed: 'fire'"):
-        labels.mask(frame, "snow")
-    with pytest.raises(ValueError, match="no AOV of aurora; allowed: .*aovs=True"):
-        labels.mask(frame, "aurora")

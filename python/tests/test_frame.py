@@ -1,7 +1,12 @@
 """Frames: the pixels of the program, arrays that belong to the caller, data."""
 
 import io
+import os
+import struct
 import subprocess
+import sys
+import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,6 +41,27 @@ def shot():
     return bansho.open(bansho.Scene.parse(TEXT), layers=True, aovs=True, figures=True)
 
 
+def codes_of(path):
+    """The codes of a PNG (RFC 2083) of 8 or 16 bits, (H, W, channels): libraries in wide use read four channels of 16 bits as 8 bits."""
+    data, chunks, at = path.read_bytes(), {}, 8
+    while at < len(data):
+        (length,), kind = struct.unpack(">I", data[at : at + 4]), data[at + 4 : at + 8]
+        chunks[kind] = chunks.get(kind, b"") + data[at + 8 : at + 8 + length]
+        at += 12 + length
+    width, height, bits, color = struct.unpack(">IIBB", chunks[b"IHDR"][:10])
+    pixel = {2: 3, 6: 4}[color] * bits // 8
+    rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, 1 + width * pixel)
+    decoded = np.zeros((height + 1, width + 1, pixel), int)
+    for y, row in enumerate(rows, start=1):
+        kind, values = row[0], row[1:].astype(int).reshape(width, pixel)
+        for x in range(1, width + 1):
+            left, up, corner = decoded[y, x - 1], decoded[y - 1, x], decoded[y - 1, x - 1]
+            nearest = np.stack([abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)]).argmin(axis=0)
+            predicted = [0, left, up, (left + up) // 2, np.choose(nearest, [left, up, corner])][kind]
+            decoded[y, x] = (values[x - 1] + predicted) % 256
+    return np.ascontiguousarray(decoded[1:, 1:], dtype=np.uint8).view(">u2" if bits == 16 else np.uint8)
+
+
 def test_light_and_aovs_are_those_of_the_exr_bit_for_bit(shot, tmp_path):
     shot.write(tmp_path / "f.####.exr", frames=[2])
     channels = channels_of(tmp_path / "f.0002.exr")
@@ -58,10 +84,17 @@ def test_display_codes_are_those_of_the_png(shot, tmp_path):
         for alpha in ("encoded", "linear"):
             plain = bansho.open(bansho.Scene.parse(TEXT), backdrop=False)
             plain.write(tmp_path / f"{alpha}{bits}.####.png", frames=[1], bits=bits, alpha=alpha)
+            stored = codes_of(tmp_path / f"{alpha}{bits}.0001.png")
+            codes = plain.render(1).display(alpha=alpha, bits=bits)
+            assert codes.dtype == (np.uint8 if bits == 8 else np.uint16) and codes.shape == (64, 96, 4)
+            assert np.array_equal(codes, stored), (alpha, bits)
+            assert np.array_equal(plain.display(1, alpha=alpha, bits=bits), codes), (alpha, bits)
             if bits == 8:
-                stored = np.asarray(Image.open(tmp_path / f"{alpha}{bits}.0001.png"))
-                assert np.array_equal(plain.render(1).display(alpha=alpha), stored), alpha
-            assert plain.display(1, alpha=alpha, bits=bits).dtype == (np.uint8 if bits == 8 else np.uint16)
+                assert np.array_equal(np.asarray(Image.open(tmp_path / f"{alpha}{bits}.0001.png")), stored)
+    # Over black, where no division by a small alpha makes dithering larger: finer codes, and nearly those of 8 bits.
+    sixteen, eight = (plain.display(1, alpha=None, bits=bits) for bits in (16, 8))
+    assert len(np.unique(sixteen[..., 0])) > 256 >= len(np.unique(eight[..., 0]))
+    assert np.abs(sixteen / 257 - eight).max() <= 1.0
 
 
 def test_the_program_writes_the_same_bytes(program, tmp_path):
@@ -71,6 +104,21 @@ def test_the_program_writes_the_same_bytes(program, tmp_path):
     subprocess.run(command, check=True, capture_output=True)
     bansho.open(bansho.Scene.load(tmp_path / "scene.toml")).write(tmp_path / "python.####.png", frames=1)
     assert (tmp_path / "program.0001.png").read_bytes() == (tmp_path / "python.0001.png").read_bytes()
+
+
+def test_the_module_is_the_program(program, tmp_path, monkeypatch):
+    bansho.Scene.parse(TEXT).save(tmp_path / "scene.toml")
+    # The module runs the program among Python's scripts, else the one on the path.
+    monkeypatch.setenv("PATH", os.pathsep.join([str(Path(program[0]).parent), os.environ["PATH"]]))
+    ran = subprocess.run([sys.executable, "-m", "bansho", "--version"], check=True, capture_output=True).stdout
+    if ran != subprocess.run([*program, "--version"], check=True, capture_output=True).stdout:
+        pytest.skip("the program among Python's scripts has another version")
+    for name, command in (("module", [sys.executable, "-m", "bansho"]), ("program", program)):
+        options = ["--frames", "1", "--layers", "--out", str(tmp_path / f"{name}.####.exr")]
+        subprocess.run([*command, "render", str(tmp_path / "scene.toml"), *options], check=True, capture_output=True)
+    assert (tmp_path / "module.0001.exr").read_bytes() == (tmp_path / "program.0001.exr").read_bytes()
+    failed = subprocess.run([sys.executable, "-m", "bansho", "render", str(tmp_path / "nothing.toml")], capture_output=True)
+    assert failed.returncode != 0 and b"nothing.toml" in failed.stderr
 
 
 def test_frames_do_not_depend_on_threads_or_on_those_before(torch_scene):
@@ -120,6 +168,43 @@ def test_data_of_a_frame(shot):
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(frame._repr_png_()))), frame.display())
 
 
+def test_particles_are_those_of_each_phenomenon(shot):
+    frame = shot.render(0)
+    assert set(frame.particles) == {"rain"}, "a sheet of flame has none"
+    drops = frame.particles["rain"]
+    assert drops["position"].shape == drops["velocity"].shape == (len(drops), 3) and len(drops) > 1000
+    # Without wind drops fall straight down, as fast as those of Gunn and Kinzer.
+    assert not drops["velocity"][:, [0, 2]].any()
+    assert -drops["velocity"][:, 1] == pytest.approx(bansho.terminal_velocity(drops["diameter_mm"].astype(float)), rel=1e-3)
+
+    burning = bansho.Scene([bansho.Picture(size=(32, 32)), bansho.FlameParticles(name="fire", particles=2000, preroll_s=1)])
+    particles = bansho.open(burning).render(1).particles["fire"]
+    units = particles.dtype.metadata["units"]
+    assert units == {"position": "m", "velocity": "m/s", "temperature": "K", "density": "kg/m^3"} and set(units) == set(particles.dtype.names)
+    assert 250 < particles["temperature"].min() < particles["temperature"].max() < 2500
+    hot = particles["temperature"] > 1000
+    assert particles["density"][hot].mean() < 0.5 * 1.2, "hot gas is light"
+    assert particles["velocity"][hot][:, 1].mean() > 0, "and rises"
+
+
+def test_names_that_are_missing_are_told_with_the_option_and_those_there_are(shot):
+    plain = bansho.open(bansho.Scene.parse(TEXT), size=(16, 16)).render(0)
+    of_scene = "allowed: aovs=True of bansho.open, with which this scene has flame_sheet.temperature_k,"
+    with pytest.raises(KeyError, match=f"^there is no AOV 'heat', since the frame has none; {of_scene}"):
+        plain.aovs["heat"]
+    with pytest.raises(KeyError, match="^there is no layer 'rain', since the frame has none; allowed: layers=True of bansho.open$"):
+        plain.layers["rain"]
+    with pytest.raises(ValueError, match="the frame has no figures; allowed: figures=True of bansho.open"):
+        _ = plain.figures
+    frame = shot.render(0)
+    with pytest.raises(bansho.MissingNameError, match="^there is no AOV 'rain.opacity'; allowed: .*rain.streak_opacity"):
+        frame.aovs["rain.opacity"]
+    with pytest.raises(bansho.MissingNameError, match="^there is no layer 'flame'; allowed: flame_sheet, rain$"):
+        frame.layers["flame"]
+    assert dict(plain.aovs) == {} and "rain" in frame.layers and frame.aovs.get("heat") is None
+    assert repr(frame.layers) == "<layers: flame_sheet, rain>" and len(frame.layers) == 2
+
+
 def test_a_plate_of_arrays_is_a_plate_of_files(photograph, tmp_path):
     depth = np.full((180, 320), 8.0, np.float32)
     Image.fromarray(photograph).save(tmp_path / "plate.png")
@@ -161,3 +246,34 @@ def test_progress_is_told_and_options_are_checked(torch_scene, tmp_path):
         bansho.open(torch_scene).display(0, alpha="sraight")
     with pytest.raises(ValueError, match="a frame number of type str"):
         bansho.open(torch_scene).render("1")
+
+
+def test_progress_of_frames_is_told(torch_scene):
+    told = []
+    shot = bansho.open(torch_scene, size=(16, 16))
+    frames = shot.frames(1, 4, step=2, progress=lambda done, total: told.append((done, total)))
+    assert next(frames).number == 1 and told == [], "it is told once the next one is asked for"
+    assert [frame.number for frame in frames] == [3] and told == [(1, 2), (2, 2)]
+
+
+def test_a_bar_of_tqdm_shows_the_progress(torch_scene, tmp_path, monkeypatch):
+    tqdm = pytest.importorskip("tqdm.auto")
+    bars = []
+
+    class Bar(tqdm.tqdm):
+        """A bar that is kept."""
+
+        def __init__(self, **options):
+            super().__init__(file=io.StringIO(), mininterval=0, **options)
+            bars.append(self)
+
+    monkeypatch.setattr(tqdm, "tqdm", Bar)
+    shot = bansho.open(torch_scene, size=(16, 16))
+    assert len(list(shot.frames(progress=True))) == 4
+    shot.write(tmp_path / "f.####.png", frames=[0, 2], progress=True)
+    assert [(bar.n, bar.total, bar.unit, bar.disable) for bar in bars] == [(4, 4, "frame", True), (2, 2, "frame", True)], "full and closed"
+
+
+def test_without_tqdm_frames_are_drawn_all_the_same(torch_scene, monkeypatch):
+    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    assert len(list(bansho.open(torch_scene, size=(16, 16)).frames(progress=True))) == 4

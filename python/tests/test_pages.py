@@ -1,13 +1,22 @@
 """The pages of the book, and the notebook, do what they show."""
 
+import importlib.util
+import inspect
 import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
 import pytest
 
+import bansho
+from bansho import reference
+
 GUIDE = Path(__file__).parents[2] / "docs" / "src" / "guide"
 NOTEBOOK = GUIDE.parents[1] / "notebooks" / "weather.ipynb"
+OPTIONAL = ("albumentations", "torch")
+"""Libraries without which the blocks that import them are left out."""
 PAGES = ("python.md", "python-datasets.md", "python-arrays.md")
 
 
@@ -21,7 +30,29 @@ def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for number, block in enumerate(blocks, start=1):
+            imported = re.findall(r"^import (\w+)", block, re.MULTILINE)
+            if any(importlib.util.find_spec(name) is None for name in imported if name in OPTIONAL):
+                continue
+            if "__main__" in block:
+                # Worker processes import the script, so it is a file.
+                script = tmp_path / f"block_{number}.py"
+                script.write_text(block, encoding="utf-8")
+                ran = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120)
+                assert ran.returncode == 0, f"{page}, block {number}: {ran.stderr}"
+                continue
             exec(compile(block, f"{page}, block {number}", "exec"), namespace)
+
+
+def test_the_reference_is_that_of_the_package():
+    page = GUIDE / "python-reference.md"
+    assert page.read_text(encoding="utf-8") == reference.page(), "run `python -m bansho.reference docs/src/guide/python-reference.md`"
+
+
+def test_the_reference_has_all_that_is_public():
+    page = reference.page()
+    for name in bansho.__all__:
+        if not inspect.ismodule(getattr(bansho, name)) and name not in ("__version__", "tables"):
+            assert f"`bansho.{name}`" in page, name
 
 
 def test_the_notebook_runs():

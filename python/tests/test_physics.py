@@ -1,6 +1,7 @@
 """Physics as arrays, against numbers of others."""
 
 import csv
+import re
 import subprocess
 from pathlib import Path
 
@@ -67,7 +68,6 @@ def test_auroral_light_peaks_where_electrons_stop():
 
 
 def test_curves_are_those_of_the_program(program):
-    assert set(plot.__all__) == {"black_body", "deposition", "drop_sizes", "emission", "quenching", "streak_opacity", "terminal_velocity"}
     text = subprocess.run([*program, "plot", "drop-sizes", "--rates", "1,20", "-o", "-"], check=True, capture_output=True, text=True).stdout
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
     table = np.array([[float(cell or "nan") for cell in line.split(",")] for line in lines[1:]])
@@ -75,8 +75,31 @@ def test_curves_are_those_of_the_program(program):
     assert np.allclose(table[:, :3], np.column_stack(list(columns.values())), rtol=1e-5)
 
 
-def test_every_curve_has_columns_of_one_length():
-    for name in plot.__all__:
+def test_every_curve_of_the_program_is_there_as_columns():
+    """Those of the page on plots: some have functions, all are tables of the program."""
+    scene = bansho.Scene({"flame_sheet": [{"name": "torch"}], "wind": {"velocity": {"keys": [[0, [0, 0, 0]], [1, [1, 0, 0]]]}}})
+    page = (Path(__file__).parents[2] / "docs" / "src" / "guide" / "plots.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^\| `plot ([a-z-]+)", page, re.MULTILINE))
+    inputs = {
+        "transfer-curves": ([scene], {}),
+        "flame-shape": ([scene], {}),
+        "flame-statistics": ([scene], {"frames": 2, "height": 32}),
+        "parameters": ([scene], {"path": "wind.velocity"}),
+    }
+    drawn_by_camera_or_from_files = {"deflection", "metadata"}
+    for name in listed - drawn_by_camera_or_from_files:
+        sources, options = inputs.get(name, ([], {}))
+        columns = plot.columns(name, *sources, **options)
+        assert len({len(column) for column in columns.values()}) == 1 and len(columns) > 1, name
+    assert listed >= {"kernel", "beam", *(name.replace("_", "-") for name in plot.__all__ if name != "columns")}
+    wind = plot.columns("parameters", scene, path="wind.velocity")
+    assert np.nanmax(wind["wind.velocity.x"]) == pytest.approx(1, abs=0.05), wind.keys()
+    with pytest.raises(ValueError, match="unrecognized subcommand 'candle'"):
+        plot.columns("candle")
+
+
+def test_every_function_has_columns_of_one_length():
+    for name in (name for name in plot.__all__ if name != "columns"):
         columns = getattr(plot, name)()
         assert len({len(column) for column in columns.values()}) == 1 and len(columns) > 1
 

@@ -2,12 +2,14 @@
 
 import subprocess
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import bansho
 
+PLATES = Path(__file__).parents[2] / "scenes" / "plates"
 K = np.array([[400.0, 0.0, 159.5], [0.0, 400.0, 89.5], [0.0, 0.0, 1.0]])
 
 
@@ -125,6 +127,33 @@ def test_physical_rain_by_day_is_hardly_seen_and_augmented_rain_is():
     assert 8 < bansho.augment_strength(1 / 60) < 14 and bansho.augment_strength(1 / 2000) == 1.0
 
 
+@pytest.mark.parametrize("name", ["court", "garden"])
+def test_20_mm_per_h_are_hardly_seen_on_a_plate_by_day(name):
+    image = pytest.importorskip("PIL.Image")
+    with image.open(PLATES / f"{name}.jpg") as picture:
+        plate = np.asarray(picture.convert("RGB"))
+    depth = np.full(plate.shape[:2], 20.0, np.float32)
+    physical, augmented = (np.abs(bansho.rain(plate, depth, rate_mm_per_h=20, **options).astype(int) - plate) for options in ({"strength": "physical"}, {"visibility": "augment"}))
+    # Of 255 codes. Airlight and streaks together: most pixels change by less than is seen, and hardly one by more than the grain of a photograph.
+    assert np.median(physical) <= 3 and np.percentile(physical, 99) <= 10
+    assert np.percentile(augmented, 99) > 4 * np.percentile(physical, 99) and np.percentile(augmented, 99) > 40
+
+
+def test_the_transmission_of_the_medium_is_apart_from_that_of_streaks():
+    """All pixels are as far, so that the medium passes the same everywhere as where there is no streak, also where many streaks overlap."""
+    depth = np.full((180, 320), 5.0, np.float32)
+    for strength in (1.0, 5.0, 20.0):
+        _, truth = bansho.rain(flat(), depth, rate_mm_per_h=100, depth_kind="distance", truth=True, strength=strength, exposure_s=1 / 200)
+        free = truth.streak_opacity == 0
+        medium = truth.transmission[free].mean(dtype=np.float64)
+        assert 1000 < free.sum() < 20_000 and np.ptp(truth.transmission[free]) < 1e-3
+        assert np.abs(truth.medium_transmission[free] - truth.transmission[free]).max() < 1e-5
+        assert np.abs(truth.medium_transmission - medium).max() < 1e-3
+        # What streaks pass is a product over them, at least one minus the sum of their opacities and at most e to the power of minus it.
+        streaks = truth.transmission / truth.medium_transmission
+        assert (streaks > 1 - truth.streak_opacity - 1e-4).all() and (streaks < np.exp(-truth.streak_opacity) + 1e-4).all()
+
+
 def test_the_strength_of_the_default_is_said_once():
     bansho.weather._noticed = False
     with warnings.catch_warnings(record=True) as caught:
@@ -214,7 +243,7 @@ def test_fog_has_the_contrast_of_koschmieder():
         ({"image": np.zeros((5, 5), np.uint8)}, r"image: an array of shape \(5, 5\); allowed: \(height, width, 3\)"),
         ({"image": np.zeros((5, 5, 3), np.int32)}, "image: an array of int32; allowed: uint8"),
         ({"image": np.full((5, 5, 3), np.nan, np.float32)}, "an image with the value NaN; allowed: finite"),
-        ({"depth": np.full((180, 320), np.nan)}, "a depth with the value NaN; allowed: numbers, and infinity or 0"),
+        ({"depth": np.full((180, 320), np.nan)}, "a depth with the value NaN; allowed: 0 or more"),
         ({"depth": np.full((180, 320), -1.0)}, "a depth with the value -1; allowed: 0 or more"),
         ({"depth": np.zeros((10, 10))}, "depth: 10 x 10 pixels have another shape than the image, 180 x 320"),
         ({"depth": np.ones((180, 320), np.uint16)}, "depth: an array of uint16 without depth_scale; allowed: depth_scale in meters"),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import bansho
-from bansho import _bansho
+from bansho import _bansho, weather
 
 LONG = "bansho = 2\n[picture]\nsize = [960, 540]\nframes = 200\n[[flame_particles]]\nparticles = 4000\npreroll_s = 30\n"
 
@@ -22,9 +22,48 @@ def test_a_panic_becomes_an_exception_and_the_interpreter_lives(capfd):
     assert bansho.open(bansho.Scene([bansho.FlameSheet()]), size=(16, 16)).render(0).linear.shape == (16, 16, 4)
 
 
+class BrokenShot:
+    """Stands in for a shot that is of no use after a panic."""
+
+    exception: type[BaseException] = bansho.InternalError
+
+    def __init__(self, threads):
+        pass
+
+    def draw(self, *arguments):
+        raise self.exception("on purpose")
+
+
+@pytest.mark.parametrize("exception", [bansho.InternalError, MemoryError, KeyboardInterrupt])
+def test_rain_and_fog_are_drawn_again_after_a_panic(monkeypatch, exception):
+    image, depth = np.full((20, 30, 3), 90, np.uint8), np.full((20, 30), 50.0, np.float32)
+    draws = [lambda: bansho.rain(image, depth, strength=5), lambda: bansho.fog(image, depth, 50.0)]
+    expected = [draw() for draw in draws]
+    monkeypatch.setattr(weather, "_cache", weather._Cache())
+    for draw, drawn in zip(draws, expected, strict=True):
+        weather._cache._shots.clear()
+        with monkeypatch.context() as broken:
+            broken.setattr(_bansho, "PlateShot", BrokenShot)
+            broken.setattr(BrokenShot, "exception", exception)
+            with pytest.raises(exception, match="on purpose"):
+                draw()
+        assert np.array_equal(draw(), drawn)
+
+
+def test_a_value_that_is_refused_leaves_the_shot_in_use(monkeypatch):
+    monkeypatch.setattr(weather, "_cache", weather._Cache())
+    image = np.full((20, 30, 3), 90, np.uint8)
+    bansho.rain(image, strength=5)
+    (shot,) = weather._cache._shots.values()
+    with pytest.raises(ValueError, match="500 is out of range"):
+        bansho.rain(image, strength=5, rate_mm_per_h=500)
+    bansho.rain(image, strength=5)
+    assert list(weather._cache._shots.values()) == [shot]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_an_interrupt_stops_the_work_within_100_ms():
-    shot = bansho.open(bansho.Scene.parse(LONG))
+def interrupted_after(seconds, work):
+    """Does `work`, which takes longer than `seconds`, interrupts it then, and returns how long it goes on, s."""
     sent = []
 
     def interrupt():
@@ -34,16 +73,32 @@ def test_an_interrupt_stops_the_work_within_100_ms():
     # A shell starts its background jobs with the signal ignored, and Python leaves it so.
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        threading.Timer(0.3, interrupt).start()
+        threading.Timer(seconds, interrupt).start()
         with pytest.raises(KeyboardInterrupt):
-            shot.render(199)
-        elapsed = time.perf_counter() - sent[0]
+            work()
+        return time.perf_counter() - sent[0]
     finally:
         signal.signal(signal.SIGINT, handler)
-    # 0.1 s on an idle machine; other programs may take the time of a thread.
-    assert elapsed < 0.3, f"{elapsed * 1e3:.0f} ms"
+
+
+def test_an_interrupt_stops_the_work_within_100_ms():
+    scene = bansho.Scene.parse(LONG)
+    shot, effect = bansho.open(scene), bansho.Effect(scene)
+    image = np.full((2160, 3840, 3), 90, np.uint8)
+    calls = {
+        "render": lambda: shot.render(199),
+        "at": lambda: effect.at(6.0),
+        "rain": lambda: [bansho.rain(image, rate_mm_per_h=80, strength=10.0, seed=seed) for seed in range(100)],
+        # The start of a loop is searched for.
+        "open": lambda: [bansho.open(bansho.Scene([bansho.FlameSheet(), bansho.Rain(rate_mm_per_h=100)]), loop_s=8.0, seed=seed) for seed in range(400)],
+    }
+    for name, call in calls.items():
+        elapsed = interrupted_after(0.3, call)
+        # 0.1 s on an idle machine; other programs may take the time of a thread.
+        assert elapsed < 0.3, f"{name}: {elapsed * 1e3:.0f} ms"
     # Other work goes on.
     assert shot.time_of(0) == 0.0
+    assert effect.time_s < 6.0
 
 
 def test_other_threads_run_while_a_frame_is_drawn():
@@ -84,6 +139,55 @@ def test_a_shot_may_be_used_from_several_threads(torch_scene):
 def rain_in_child(queue):
     image = np.full((48, 64, 3), 90, np.uint8)
     queue.put(bansho.rain(image, rate_mm_per_h=80, strength=10.0, seed=3).tobytes())
+
+
+def plate_in_child(queue):
+    """Opens a shot and an effect over an array, in a process whose parent has done the same."""
+    queue.put(over_an_array())
+
+
+def over_an_array():
+    scene = bansho.Scene({"picture": {"size": [64, 48]}, "plate": {"image": "street"}, "rain": [{"rate_mm_per_h": 80.0, "opacity_gain": 10.0}]})
+    arrays = {"street": np.full((48, 64, 3), 90, np.uint8)}
+    return bansho.open(scene, arrays=arrays).render(0).display().tobytes() + bansho.Effect(scene, arrays=arrays).linear().tobytes()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_process_opens_pictures_that_are_arrays():
+    expected = over_an_array()
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    process = context.Process(target=plate_in_child, args=(queue,))
+    process.start()
+    try:
+        assert queue.get(timeout=60) == expected
+    finally:
+        process.join(10)
+        process.kill()
+
+
+def test_threads_that_share_a_shot_and_an_effect_wait_for_each_other():
+    """Their frames have many parts, so that threads of the pool take on work of one call while they wait for parts of another."""
+    scene = bansho.Scene([bansho.Picture(size=(640, 360)), bansho.FlameSheet(), bansho.Rain(rate_mm_per_h=50)])
+    shot, effect = bansho.open(scene, threads=4), bansho.Effect(scene, threads=4)
+    expected = [shot.render(number).linear.sum() for number in range(3)]
+    failed = []
+
+    def draw(thread):
+        for turn in range(6):
+            number = (thread + turn) % 3
+            if shot.render(number).linear.sum() != expected[number] or effect.size != (640, 360):
+                failed.append(number)
+            effect.at(0.1 * number)
+
+    threads = [threading.Thread(target=draw, args=(thread,), daemon=True) for thread in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+        assert not thread.is_alive(), "the threads wait for each other forever"
+    assert not failed
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")

@@ -2,7 +2,10 @@
 
 use std::{collections::HashSet, sync::Arc};
 
-use bansho_base::phenomenon::{PhenomenonInfo, Remark};
+use bansho_base::{
+    host::observer::Unobserved,
+    phenomenon::{PhenomenonInfo, Remark},
+};
 
 use crate::{
     compiled::CompiledScene,
@@ -90,7 +93,7 @@ fn greatest_change(compiled: &Arc<CompiledScene>, plan: &Plan, name: &str) -> Re
     let frames = plan.frames();
     let mut greatest = Change { mean: 0.0, peak: 0.0 };
     for number in [(frames.start + frames.end) / 2, frames.start, frames.end - 1] {
-        let [with, without] = shots.each_mut().map(|shot| draw_thumbnail(shot, number));
+        let [with, without] = shots.each_mut().map(|shot| draw_thumbnail(shot, number, &Unobserved));
         let change = Change::between(&with?, &without?);
         greatest = Change { mean: greatest.mean.max(change.mean), peak: greatest.peak.max(change.peak) };
         if !greatest.is_faint() {

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from . import datasets, labels, plot, tables, transforms
 from ._bansho import __version__
-from .errors import InternalError, PhysicalStrengthNotice, Problem, SceneError
+from .errors import InternalError, MissingNameError, PhysicalStrengthNotice, Problem, SceneError
 from .frame import Aov, Figure, Frame, FrameCamera, FrameLight
 from .live import Effect
 from .physics import *
@@ -38,6 +38,7 @@ __all__ = [
     "FrameCamera",
     "FrameLight",
     "InternalError",
+    "MissingNameError",
     "PhysicalStrengthNotice",
     "Problem",
     "RainTruth",

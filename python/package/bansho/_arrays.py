@@ -7,6 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _checks
+
 DepthKind = Literal["axis", "distance", "inverse"]
 
 
@@ -19,8 +21,11 @@ def as_numpy(array: Any, name: str) -> NDArray[Any]:
             return np.from_dlpack(array)
         except (BufferError, RuntimeError, TypeError) as reason:
             raise ValueError(f"{name}: cannot be read by DLPack ({reason}); allowed: an array in main memory") from None
-    result = np.asarray(array)
-    if result.dtype == object:
+    try:
+        result = np.asarray(array)
+    except (TypeError, ValueError, RuntimeError) as reason:
+        raise ValueError(f"{name}: a {type(array).__name__} ({reason}); allowed: an array of numbers of one shape") from None
+    if result.dtype.kind in "OSU":
         raise ValueError(f"{name}: a {type(array).__name__}; allowed: an array of numbers of one shape")
     return result
 
@@ -48,6 +53,8 @@ def depth(array: Any, size: tuple[int, int], kind: str, scale: float | None, nam
         raise ValueError(f"{name}: an array of shape {values.shape}; allowed: (height, width), here {size}")
     if values.shape[0] * size[1] != values.shape[1] * size[0]:
         raise ValueError(f"{name}: {values.shape[0]} x {values.shape[1]} pixels have another shape than the image, {size[0]} x {size[1]}; allowed: the image's aspect ratio")
+    if scale is not None:
+        scale = _checks.number(scale, "depth_scale", "a number of meters for each unit of the depth, or None")
     if kind not in ("axis", "distance", "inverse"):
         raise ValueError(f'depth_kind: {kind!r}; allowed: "axis", "distance", "inverse"')
     if np.issubdtype(values.dtype, np.integer):

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _checks
 from .frame import FrameCamera
 
 DEFAULT_FOV_DEG = math.degrees(2 * math.atan(12 / 28))
 """Vertical field of view that is assumed without a camera: that of a lens of 28 mm on a sensor 24 mm high."""
+
+ALLOWED_POSE = "4 x 4, world from camera, whose axes are right, up and backward, with y up in the world"
 
 EYE_HEIGHT_M = 1.6
 """Height of the camera above the ground that is assumed without a pose."""
@@ -26,8 +29,8 @@ def intrinsics(camera: Any, size: tuple[int, int]) -> dict[str, Any]:
         if camera.lens != "perspective":
             raise ValueError(f'camera: a {camera.lens} lens; allowed: "perspective"')
         camera = camera.K
-    matrix = np.asarray(camera, dtype=np.float64)
     allowed = "a matrix K [[f, 0, cx], [0, f, cy], [0, 0, 1]] in pixels"
+    matrix = _checks.numbers(camera, "camera", allowed)
     if matrix.shape != (3, 3):
         raise ValueError(f"camera: an array of shape {matrix.shape}; allowed: {allowed}")
     if not np.isfinite(matrix).all():
@@ -51,8 +54,8 @@ def intrinsics(camera: Any, size: tuple[int, int]) -> dict[str, Any]:
 
 def checked_pose(pose: Any, name: str = "pose") -> NDArray[np.float64]:
     """A pose as a matrix 4 x 4, world from camera: right, up, backward, in m, y up."""
-    matrix = np.asarray(pose, dtype=np.float64)
-    allowed = "4 x 4, world from camera, whose axes are right, up and backward, with y up in the world"
+    allowed = ALLOWED_POSE
+    matrix = _checks.numbers(pose, name, allowed)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         raise ValueError(f"{name}: an array of shape {matrix.shape}; allowed: {allowed}")
     rotation = matrix[:3, :3]
@@ -68,17 +71,40 @@ def level_pose() -> NDArray[np.float64]:
     return pose
 
 
-def pose_keys(poses: list[NDArray[np.float64]], frame_s: float) -> dict[str, Any]:
-    """Position, target and up of a camera that has these poses, one for each frame."""
-    values: dict[str, list[Any]] = {"position": [], "target": [], "up": []}
-    for pose in poses:
-        values["position"].append(pose[:3, 3].tolist())
-        # Far enough that rounding does not turn the camera.
-        values["target"].append((pose[:3, 3] - 10.0 * pose[:3, 2]).tolist())
-        values["up"].append(pose[:3, 1].tolist())
+def pose_keys(poses: list[NDArray[np.float64]], frame_s: float = 1.0, exposure_s: float = 0.0) -> dict[str, Any]:
+    """Position, target and up of a camera that has these poses, one for each frame, at the middle of the exposures, which begin every `frame_s` (s).
+
+    A pose before the first and one after the last go on as the camera moves between the two that are nearest, so that it moves during each whole exposure.
+    """
     if len(poses) == 1:
-        return {key: sequence[0] for key, sequence in values.items()}
-    return {
-        key: {"keys": [[index * frame_s, value] for index, value in enumerate(sequence)], "interpolation": "linear"}
-        for key, sequence in values.items()
-    }
+        return {key: value for key, value in zip(_KEYS, _place(poses[0]), strict=True)}
+    middle = 0.5 * exposure_s
+    times = [index * frame_s + middle for index in range(len(poses))]
+    # Frames from the middle of an exposure to its end: 1 unless exposures overlap.
+    beyond = max(1, math.ceil(middle / frame_s))
+    times = [times[0] - beyond * frame_s, *times, times[-1] + beyond * frame_s]
+    poses = [_continued(poses[1], poses[0], beyond), *poses, _continued(poses[-2], poses[-1], beyond)]
+    values: dict[str, list[Any]] = {key: [] for key in _KEYS}
+    for time, pose in zip(times, poses, strict=True):
+        for key, value in zip(_KEYS, _place(pose), strict=True):
+            values[key].append([time, value])
+    return {key: {"keys": keys, "interpolation": "linear"} for key, keys in values.items()}
+
+
+_KEYS = ("position", "target", "up")
+
+
+def _place(pose: NDArray[np.float64]) -> list[list[float]]:
+    """Position, target and up of a pose."""
+    position = pose[:3, 3]
+    # The target is far enough that rounding does not turn the camera.
+    return [position.tolist(), (position - 10.0 * pose[:3, 2]).tolist(), pose[:3, 1].tolist()]
+
+
+def _continued(before: NDArray[np.float64], pose: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
+    """The pose some frames after `pose`, if the camera goes on moving and turning as it did from `before` to it."""
+    continued = pose.copy()
+    continued[:3, 3] += frames * (pose[:3, 3] - before[:3, 3])
+    turn = pose[:3, :3] @ before[:3, :3].T
+    continued[:3, :3] = np.linalg.matrix_power(turn, frames) @ pose[:3, :3]
+    return continued

@@ -13,16 +13,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from . import transforms, weather
+from . import _checks, _workers, transforms, weather
 from .scene import Scene
 from .shot import open as open_shot
 
 __all__ = ["AllSkyAurora", "RainPairs", "iterate"]
-
-
-def in_worker() -> bool:
-    """Whether this is a worker process, in which one thread draws: there is a process for each core already."""
-    return multiprocessing.parent_process() is not None
 
 
 def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
@@ -64,13 +59,14 @@ class RainPairs:
     ) -> None:
         """`images` are arrays (H, W, 3) of `uint8`, or paths; `depths` arrays or paths (`.npy`, or integers with `depth_scale`), one for each image.
 
-        Each image makes `per_image` pairs. With `truth` each item also has `streak_opacity`, `streak_depth`, `diameter_mm` and `transmission`. `transform`
-        changes an item before it is returned, such as to tensors. `rain` are the parameters of `bansho.transforms.Rain`.
+        Each image makes `per_image` pairs. With `truth` each item also has `streak_opacity`, `streak_depth`, `diameter_mm`, `transmission` and
+        `medium_transmission`. `transform` changes an item before it is returned, such as to tensors. `rain` are the parameters of `bansho.transforms.Rain`.
         """
         if len(images) == 0:
             raise ValueError("images: none; allowed: one or more")
         if depths is not None and len(depths) != len(images):
             raise ValueError(f"depths: {len(depths)} for {len(images)} images; allowed: one for each, or None")
+        per_image = _checks.whole(per_image, "per_image", "1 or more")
         if per_image < 1:
             raise ValueError(f"per_image: {per_image}; allowed: 1 or more")
         self.images, self.depths = images, depths
@@ -89,12 +85,11 @@ class RainPairs:
         depth = None if self.depths is None else self.depths[source]
         depth = read_depth(depth) if isinstance(depth, (str, os.PathLike)) else depth
         parameters = self.rain.parameters(np.random.default_rng([self.seed, index]))
-        threads = 1 if in_worker() else None
-        options = {"threads": threads, **self.rain.options, **parameters}
+        options = {"threads": _workers.default_threads(), **self.rain.options, **parameters}
         item: dict[str, Any] = {"index": index, "clean": clean, **parameters}
         if self.truth:
             item["rainy"], values = weather.rain(clean, depth, truth=True, **options)
-            for name in ("streak_opacity", "streak_depth", "diameter_mm", "transmission"):
+            for name in ("streak_opacity", "streak_depth", "diameter_mm", "transmission", "medium_transmission"):
                 item[name] = getattr(values, name)
         else:
             item["rainy"] = weather.rain(clean, depth, **options)
@@ -122,6 +117,7 @@ class AllSkyAurora:
         exposure_ev100: float | None = None,
     ) -> None:
         """Energies and energy fluxes are drawn evenly in their logarithms."""
+        count = _checks.whole(count, "count", "1 or more")
         if count < 1:
             raise ValueError(f"count: {count}; allowed: 1 or more")
         self.count, self.size, self.seed, self.particles = count, size, seed, particles
@@ -166,7 +162,7 @@ class AllSkyAurora:
         if not 0 <= index < self.count:
             raise IndexError(f"item {index}; allowed: 0 to {self.count - 1}")
         scene = self.scene(index)
-        shot = open_shot(scene, aovs=True, backdrop=False, threads=1 if in_worker() else None)
+        shot = open_shot(scene, aovs=True, backdrop=False, threads=_workers.default_threads())
         frame = shot.render(0)
         item: dict[str, Any] = {"index": index, "image": frame.display(), "scene": scene.to_toml()}
         item |= {key: scene[f"aurora.{key}"] for key in ("energy_ev", "flux_mw_per_m2")}
@@ -189,11 +185,12 @@ def _item(index: int) -> Any:
 def iterate(dataset: Any, *, workers: int | None = None, indices: Sequence[int] | None = None) -> Iterator[Any]:
     """The items of a data set in order, made by worker processes, one thread each; `workers=0` makes them in this process.
 
-    The items are the same for any number of workers. At most three items for each worker are in memory.
+    The items are the same for any number of workers. At most three items for each worker are in memory. The workers are started anew and import the script
+    that is running, so a script calls this below ``if __name__ == "__main__":``.
     """
     numbers = range(len(dataset)) if indices is None else indices
     workers = len(os.sched_getaffinity(0)) if workers is None and hasattr(os, "sched_getaffinity") else workers
-    workers = (os.cpu_count() or 1) if workers is None else workers
+    workers = (os.cpu_count() or 1) if workers is None else _checks.whole(workers, "workers", "0 or more")
     if workers < 0:
         raise ValueError(f"workers: {workers}; allowed: 0 or more")
     if workers == 0:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["InternalError", "PhysicalStrengthNotice", "Problem", "SceneError"]
+__all__ = ["InternalError", "MissingNameError", "PhysicalStrengthNotice", "Problem", "SceneError"]
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,14 @@ class SceneError(ValueError):
     def allowed(self) -> str | None:
         """What is allowed instead of the first problem."""
         return self.problems[0].allowed if self.problems else None
+
+
+class MissingNameError(KeyError):
+    """A frame has no AOV or layer of that name. The message says what is allowed."""
+
+    def __str__(self) -> str:
+        # That of a KeyError is its argument in quotes.
+        return str(self.args[0]) if self.args else ""
 
 
 class InternalError(RuntimeError):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _bansho, _png
+from .errors import MissingNameError
 
 if TYPE_CHECKING:
     from .shot import Shot
@@ -36,6 +36,35 @@ class Aov(np.ndarray):  # type: ignore[type-arg]
     def __array_finalize__(self, source: Any) -> None:
         self.unit = getattr(source, "unit", "")
         self.doc = getattr(source, "doc", "")
+
+
+AnyArray = TypeVar("AnyArray", bound="NDArray[Any]")
+
+
+class NamedArrays(Mapping[str, AnyArray], Generic[AnyArray]):
+    """Arrays by name. The error of a name that is missing says which option of `bansho.open` is needed, and which names there are."""
+
+    def __init__(self, arrays: dict[str, AnyArray], what: str, option: str, is_on: bool, available: Iterable[str]) -> None:
+        """`what` they are, the `option` of `bansho.open` that asks for them, whether it is on, and the names that there are with it."""
+        self._arrays, self._what, self._option, self._is_on, self._available = arrays, what, option, is_on, tuple(available)
+
+    def __getitem__(self, name: str) -> AnyArray:
+        if name in self._arrays:
+            return self._arrays[name]
+        listed = ", ".join(self._available)
+        if not self._is_on:
+            of_scene = f", with which this scene has {listed}" if listed else ""
+            raise MissingNameError(f"there is no {self._what} {name!r}, since the frame has none; allowed: {self._option}=True of bansho.open{of_scene}")
+        raise MissingNameError(f"there is no {self._what} {name!r}; allowed: {listed or 'none, since the scene has none'}")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._arrays)
+
+    def __len__(self) -> int:
+        return len(self._arrays)
+
+    def __repr__(self) -> str:
+        return f"<{self._what}s: {', '.join(self._arrays) or 'none'}>"
 
 
 @dataclass(frozen=True)
@@ -143,8 +172,7 @@ class Frame:
         """Exposure time, s."""
         self.opaque: bool = values["opaque"]
         """Whether a plate fills the picture."""
-        self.figures: tuple[Figure, ...] = tuple(Figure(*entry) for entry in values["figures"])
-        """Numbers that characterize it; with `figures=True` of `bansho.open`."""
+        self._figures: tuple[Figure, ...] = tuple(Figure(*entry) for entry in values["figures"])
         described = {name: (unit, doc) for name, unit, doc in shot._shot.aovs}
         aovs: dict[str, Aov] = {}
         planes: dict[str, NDArray[np.float32]] = {}
@@ -153,10 +181,19 @@ class Frame:
                 planes[name] = plane
             else:
                 aovs[name] = Aov(plane, *described.get(name, ("", "")))
-        self.aovs: Mapping[str, Aov] = MappingProxyType(aovs)
+        options = shot._options
+        self.aovs: Mapping[str, Aov] = NamedArrays(aovs, "AOV", "aovs", options.get("aovs", False), aovs or described)
         """AOVs by name, such as `rain.streak_opacity`, (H, W), with `.unit` and `.doc`; with `aovs=True` of `bansho.open`."""
-        self.layers: Mapping[str, NDArray[np.float32]] = MappingProxyType(_layers(planes))
+        layers = _layers(planes)
+        self.layers: Mapping[str, NDArray[np.float32]] = NamedArrays(layers, "layer", "layers", options.get("layers", False), layers)
         """The layer of each phenomenon by name, (H, W, 4), premultiplied ACEScg; with `layers=True` of `bansho.open`."""
+
+    @property
+    def figures(self) -> tuple[Figure, ...]:
+        """Numbers that characterize it; with `figures=True` of `bansho.open`, else a `ValueError`."""
+        if not self._shot._options.get("figures", False):
+            raise ValueError("the frame has no figures; allowed: figures=True of bansho.open")
+        return self._figures
 
     @property
     def linear(self) -> NDArray[np.float32]:

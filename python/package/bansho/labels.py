@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _checks
 from .frame import Frame
 
-__all__ = ["Box", "Category", "aurora_mask", "boxes", "coco", "fire_mask", "mask", "rain_mask", "rle", "smoke_mask", "yolo"]
+__all__ = ["Box", "Category", "aurora_mask", "boxes", "coco", "fire_mask", "luminance_mask", "mask", "rain_mask", "rle", "smoke_mask", "yolo"]
 
 Category = Literal["fire", "smoke", "rain", "aurora"]
 
 THRESHOLDS: Mapping[str, float] = {"fire": 800.0, "smoke": 0.1, "rain": 0.01, "aurora": 1.0}
 """Default thresholds: fire, temperature of soot in K; smoke, optical depth; rain, opacity of streaks; aurora, brightness of the green line in kR."""
+
+LUMINANCE_RATIO = 0.02
+"""Default threshold against the background, luminance of a layer divided by that of the rest of the frame: 2 %, the contrast at which an object is seen by
+the definition of the meteorological visibility (Koschmieder)."""
+
+MEASURES: Mapping[str, str] = {"fire": "temperature_k", "smoke": "optical_depth", "rain": "streak_opacity", "aurora": "kilorayleigh_557"}
+"""The AOV of each category, after the name of the phenomenon."""
+
+LUMINANCE = np.array([0.2722287, 0.6740818, 0.0536895], np.float32)
+"""Weights of ACEScg components in the luminance (Academy S-2014-004)."""
 
 
 def _plane(frame: Frame, suffix: str, what: str) -> NDArray[np.float32]:
@@ -47,12 +58,49 @@ def aurora_mask(frame: Frame, kilorayleigh: float = THRESHOLDS["aurora"]) -> NDA
     return _plane(frame, "kilorayleigh_557", "aurora") >= kilorayleigh
 
 
-def mask(frame: Frame, category: Category, threshold: float | None = None) -> NDArray[np.bool_]:
-    """The mask of a category at a threshold, by default that of `THRESHOLDS`."""
-    masks = {"fire": fire_mask, "smoke": smoke_mask, "rain": rain_mask, "aurora": aurora_mask}
+def luminance_mask(frame: Frame, layers: str | Sequence[str], ratio: float = LUMINANCE_RATIO) -> NDArray[np.bool_]:
+    """Where layers together are at least `ratio` times as bright as the rest of the frame, (H, W): what is seen against the background.
+
+    `layers` are the names of one or more of `frame.layers`. The luminances are those of the light, without glare. In front of black any light is seen. All
+    that a phenomenon adds to the picture counts, such as the airlight of rain.
+    """
+    least = _checks.number(ratio, "ratio", "a number above 0")
+    if least <= 0:
+        raise ValueError(f"ratio: {ratio!r}; allowed: a number above 0")
+    names = [layers] if isinstance(layers, str) else list(layers)
+    if not names:
+        raise ValueError("layers: none; allowed: one or more names of frame.layers")
+    added = np.sum([frame.layers[name][..., :3] for name in names], axis=0) @ LUMINANCE
+    # Layers are what is added to the picture, as it is seen from the camera.
+    rest = np.maximum(frame.in_space("acescg")[..., :3] @ LUMINANCE - added, 0)
+    return (added > 0) & (added >= least * rest)
+
+
+def _layers_of(frame: Frame, category: Category) -> list[str]:
+    """The names of the phenomena of a category: those that have its AOV."""
+    if category == "smoke":
+        raise ValueError("by: 'luminance' of smoke, which is in the layer of its fire; allowed: 'fire', 'rain', 'aurora'")
+    phenomena = [name.rpartition(".")[0] for name, *_ in frame._shot._shot.aovs if name.rpartition(".")[2] == MEASURES[category]]
+    if not phenomena:
+        raise ValueError(f"the frame has no {category}; allowed: a frame of a scene with it")
+    return phenomena
+
+
+def mask(frame: Frame, category: Category, threshold: float | None = None, *, by: Literal["measure", "luminance"] = "measure") -> NDArray[np.bool_]:
+    """The mask of a category at a threshold, (H, W).
+
+    By its measure the threshold is a physical one, by default that of `THRESHOLDS`; the frame needs `aovs=True`. By luminance it is that of the category's layers
+    divided by that of the rest of the frame, by default `LUMINANCE_RATIO`; the frame needs `layers=True`, and smoke has none.
+    """
+    masks: dict[str, Callable[[Frame, float], NDArray[np.bool_]]] = {"fire": fire_mask, "smoke": smoke_mask, "rain": rain_mask, "aurora": aurora_mask}
     if category not in masks:
         raise ValueError(f"category: {category!r}; allowed: {', '.join(map(repr, masks))}")
-    return masks[category](frame, THRESHOLDS[category] if threshold is None else threshold)
+    if by == "luminance":
+        return luminance_mask(frame, _layers_of(frame, category), LUMINANCE_RATIO if threshold is None else threshold)
+    if by != "measure":
+        raise ValueError(f"by: {by!r}; allowed: 'measure', 'luminance'")
+    least = THRESHOLDS[category] if threshold is None else _checks.number(threshold, "threshold")
+    return masks[category](frame, least)
 
 
 @dataclass(frozen=True)
@@ -136,10 +184,14 @@ def rle(mask: NDArray[np.bool_]) -> dict[str, Any]:
 
 
 def coco(masks: Iterable[tuple[str, Mapping[str, NDArray[np.bool_]]]], categories: Sequence[str] = ("fire", "smoke", "rain", "aurora"), *, min_area: int = 1) -> dict[str, Any]:
-    """A COCO data set of pictures: of each its file name, and its masks by category. Every connected part is an annotation with its box and its run lengths."""
+    """A COCO data set of pictures: of each its file name, and its masks by category. Every connected part is an annotation of an object (`iscrowd` 0) with its box
+    and its run lengths, which pycocotools and torchvision read as they do polygons.
+    """
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     for number, (name, by_category) in enumerate(masks, start=1):
+        if not by_category:
+            raise ValueError(f"masks of {name!r}: none; allowed: one or more, which may be empty, since they have the size of the picture")
         for category, part in by_category.items():
             if category not in categories:
                 raise ValueError(f"category: {category!r}; allowed: {', '.join(map(repr, categories))}")
@@ -154,7 +206,7 @@ def coco(masks: Iterable[tuple[str, Mapping[str, NDArray[np.bool_]]]], categorie
                         "category_id": categories.index(category) + 1,
                         "bbox": [box.x, box.y, box.width, box.height],
                         "area": box.area,
-                        "iscrowd": 1,
+                        "iscrowd": 0,
                         "segmentation": rle(within),
                     }
                 )

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _bansho
+from . import _bansho, _checks
 from .frame import Alpha, Space, structured
 from .scene import Scene
 from .shot import View, as_scene, stored_arrays
@@ -56,24 +56,24 @@ class Effect:
             described.to_toml(),
             described.name,
             stored_arrays(described, arrays),
-            size=size,
-            seed=seed,
-            loop_s=loop_s,
+            size=_checks.sides(size, "size"),
+            seed=None if seed is None else _checks.whole(seed, "seed", "a whole number from 0 to 9e15"),
+            loop_s=None if loop_s is None else _checks.number(loop_s, "loop_s", "a number of seconds"),
             backdrop=backdrop,
             layers=layers,
             aovs=aovs,
-            shutter_s=shutter_s,
-            max_steps=max_steps,
-            threads=threads,
+            shutter_s=None if shutter_s is None else _checks.number(shutter_s, "shutter_s", "a number of seconds"),
+            max_steps=None if max_steps is None else _checks.whole(max_steps, "max_steps", "a whole number above 0"),
+            threads=_checks.threads(threads),
         )
 
     def advance(self, dt: float) -> float:
         """Lets `dt` seconds pass and draws. Returns the time that simulations did not reach within their steps, s: pass it with the next `dt`, or drop it."""
-        return self._effect.advance(dt)
+        return self._effect.advance(_time(dt, "dt"))
 
     def at(self, seconds: float) -> None:
         """Goes to a time and draws. Simulations cannot go back; see `restart`."""
-        self._effect.at(seconds)
+        self._effect.at(_time(seconds, "seconds"))
 
     def restart(self) -> None:
         """Begins again at time 0."""
@@ -81,7 +81,7 @@ class Effect:
 
     def set_wind(self, velocity: Sequence[float], gust: float = 0.0) -> None:
         """Sets the mean wind, m/s, and its turbulence intensity, which are reached within 0.25 s."""
-        self._effect.set_wind([float(component) for component in velocity], float(gust))
+        self._effect.set_wind(_checks.vector(velocity, "velocity"), _checks.number(gust, "gust"))
 
     def set_camera(self, **keys: Any) -> None:
         """Sets keys of the camera, such as `position`, from the next picture on; the others stay."""
@@ -89,15 +89,15 @@ class Effect:
 
     def set_size(self, width: int, height: int) -> None:
         """Sets the size of the picture, pixels."""
-        self._effect.set_size(width, height)
+        self._effect.set_size(_checks.whole(width, "width"), _checks.whole(height, "height"))
 
     def set_exposure_ev100(self, exposure_ev100: float) -> None:
         """Sets the exposure value at ISO 100."""
-        self._effect.set_exposure_ev100(exposure_ev100)
+        self._effect.set_exposure_ev100(_checks.number(exposure_ev100, "exposure_ev100"))
 
     def set_rain_rate(self, rate_mm_per_h: float, name: str = "rain") -> None:
         """Sets the rate of a rain, which is reached within 0.25 s."""
-        self._effect.set_rain_rate(name, float(rate_mm_per_h))
+        self._effect.set_rain_rate(name, _checks.number(rate_mm_per_h, "rate_mm_per_h"))
 
     def ignite(self, name: str) -> None:
         """Lights a flame, which grows within half a second."""
@@ -109,11 +109,11 @@ class Effect:
 
     def set_flow(self, name: str, flow: float) -> None:
         """Sets the gas flow of a flame as a fraction of full flow."""
-        self._effect.set_flow(name, float(flow))
+        self._effect.set_flow(name, _checks.number(flow, "flow"))
 
     def move_to(self, name: str, position: Sequence[float], seconds: float = 0.0) -> None:
         """Moves a flame to a position, m, within `seconds`."""
-        self._effect.move_to(name, [float(component) for component in position], float(seconds))
+        self._effect.move_to(name, _checks.vector(position, "position"), _checks.number(seconds, "seconds"))
 
     def linear(self, out: Any = None, *, space: Space = "linear_srgb") -> NDArray[np.float32]:
         """The picture as premultiplied light, (H, W, 4), into `out` if it is given: an array of numpy, or a buffer that numpy can write to."""
@@ -144,12 +144,16 @@ class Effect:
         width, height = self.size
         if out is None:
             return np.empty((height, width, *channels), dtype)
-        if isinstance(out, np.ndarray):
-            buffer = out
-        elif hasattr(out, "__dlpack__"):
-            buffer = np.from_dlpack(out)
-        else:
-            buffer = np.asarray(memoryview(out))
+        try:
+            if isinstance(out, np.ndarray):
+                buffer = out
+            elif hasattr(out, "__dlpack__"):
+                buffer = np.from_dlpack(out)
+            else:
+                buffer = np.asarray(memoryview(out))
+        except (BufferError, RuntimeError, TypeError, ValueError) as reason:
+            allowed = f"an array (height, width{', 4' if channels else ''}) of {np.dtype(dtype)} in main memory, such as one of numpy"
+            raise ValueError(f"out: a {type(out).__name__} ({reason}); allowed: {allowed}") from None
         if buffer.dtype != dtype:
             raise ValueError(f"out: an array of {buffer.dtype}; allowed: {np.dtype(dtype)}")
         if not buffer.flags["W"]:
@@ -190,3 +194,10 @@ class Effect:
     def __repr__(self) -> str:
         width, height = self.size
         return f"<Effect at {self.time_s:.3f} s: {width} x {height}>"
+
+
+def _time(value: Any, name: str) -> float:
+    """A time, s; whether it is finite is checked where what is allowed is known."""
+    if isinstance(value, (float, int)):
+        return float(value)
+    return _checks.number(value, name, "a number of seconds")

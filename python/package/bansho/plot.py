@@ -1,17 +1,52 @@
-"""The curves of `bansho plot` as arrays: each function returns the columns of its table by name."""
+"""The curves of `bansho plot` as arrays: each function returns the columns of its table by name, and `columns` those of any curve of the program."""
 
 from __future__ import annotations
 
+import csv
+import subprocess
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import physics
+from .__main__ import program
+from .scene import Scene
 
-__all__ = ["black_body", "deposition", "drop_sizes", "emission", "quenching", "streak_opacity", "terminal_velocity"]
+__all__ = ["black_body", "columns", "deposition", "drop_sizes", "emission", "quenching", "streak_opacity", "terminal_velocity"]
 
 Columns = dict[str, NDArray[np.float64]]
+
+
+def columns(curve: str, *inputs: Scene | str | Path, **options: Any) -> Columns:
+    """The table of `bansho plot CURVE`, by the program that is installed with this package: `columns("flame-statistics", "torch.toml", frames=24)`.
+
+    :param curve: its name on the page on plots: `"kernel"`, `"beam"`, `"transfer-curves"`, `"flame-shape"`, `"parameters"`, `"metadata"` and the others.
+    :param inputs: what it is made from: a scene, or the path of one; of `"metadata"` the files of frames.
+    :param options: the options of the program, with underscores in place of hyphens; lists are joined by commas.
+    :returns: the columns by name; NaN where there is no number.
+    :raises ValueError: what the program says of an unknown curve or option.
+    """
+    arguments = [curve.replace("_", "-")]
+    with tempfile.TemporaryDirectory() as folder:
+        for number, source in enumerate(inputs):
+            if isinstance(source, Scene):
+                path = Path(folder) / f"scene_{number}.toml"
+                path.write_text(source.to_toml(), encoding="utf-8")
+                source = path
+            arguments.append(str(source))
+        for name, value in options.items():
+            values = value if isinstance(value, (list, tuple)) else [value]
+            arguments += [f"--{name.replace('_', '-')}", ",".join(str(item) for item in values)]
+        done = subprocess.run([str(program()), "plot", *arguments, "-o", "-"], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise ValueError(done.stderr.strip())
+    _, names, *rows = csv.reader(done.stdout.splitlines())
+    numbers = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows], dtype=np.float64)
+    return dict(zip(names, numbers.T, strict=True))
 
 
 def black_body(start_k: float = 1.0, end_k: float = 10_000.0, step_k: float = 1.0) -> Columns:
@@ -27,7 +62,7 @@ def black_body(start_k: float = 1.0, end_k: float = 10_000.0, step_k: float = 1.
     return columns
 
 
-def drop_sizes(rates_mm_per_h: Sequence[float] = (1.0, 5.0, 10.0, 20.0)) -> Columns:
+def drop_sizes(rates_mm_per_h: Sequence[float] = (1.0, 5.0, 20.0, 50.0)) -> Columns:
     """Number density of drops by diameter at rain rates, 1/(m^3 mm)."""
     columns: Columns = {"diameter_mm": physics.drop_sizes(1.0).diameter_mm}
     for rate in rates_mm_per_h:

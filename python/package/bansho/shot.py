@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _arrays, _bansho
+from . import _arrays, _bansho, _checks
 from .frame import Alpha, Frame, FrameCamera, Space, camera_of
 from .scene import Scene
 
@@ -117,7 +117,12 @@ class Shot:
         if space not in ("acescg", "linear_srgb"):
             raise ValueError(f'space: {space!r}; allowed: "acescg", "linear_srgb"')
         for name in ("size", "crop"):
-            options[name] = _sides(options.get(name), name)
+            options[name] = _checks.sides(options.get(name), name)
+        options["threads"] = _checks.threads(options.get("threads"))
+        if options.get("seed") is not None:
+            options["seed"] = _checks.whole(options["seed"], "seed", "a whole number from 0 to 9e15")
+        if options.get("loop_s") is not None:
+            options["loop_s"] = _checks.number(options["loop_s"], "loop_s", "a number of seconds")
         self.scene = scene.copy()
         """The scene that is drawn."""
         self._space: Space = space
@@ -241,17 +246,6 @@ def _whole(number: Any) -> int:
         return int(number.__index__())
     except AttributeError:
         raise ValueError(f"a frame number of type {type(number).__name__}; allowed: int") from None
-
-
-def _sides(given: Any, name: str) -> tuple[int, ...] | None:
-    """Numbers of pixels, none below 0."""
-    if given is None:
-        return None
-    sides = tuple(_whole(side) for side in given)
-    count = 2 if name == "size" else 4
-    if len(sides) != count or min(sides) < 0:
-        raise ValueError(f"{name}: {given!r}; allowed: {count} numbers of pixels, none below 0")
-    return sides
 
 
 def _reporter(progress: bool | Progress, count: int) -> Progress:

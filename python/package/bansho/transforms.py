@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from . import weather
+from . import _checks, _workers, weather
 
 __all__ = ["Fog", "Rain"]
 
@@ -15,27 +15,38 @@ Interval = float | tuple[float, float]
 
 def _interval(value: Any, name: str) -> tuple[float, float]:
     """A number, or the ends of an interval."""
-    low, high = (value, value) if np.isscalar(value) else value
-    if not (np.isfinite(low) and np.isfinite(high) and low <= high):
-        raise ValueError(f"{name}: {value!r}; allowed: a number, or (low, high)")
-    return float(low), float(high)
+    allowed = "a number, or (low, high)"
+    ends = _checks.numbers(value, name, allowed)
+    if ends.shape not in ((), (2,)) or not np.isfinite(ends).all():
+        raise ValueError(f"{name}: {value!r}; allowed: {allowed}")
+    low, high = (float(end) for end in np.broadcast_to(ends, 2))
+    if low > high:
+        raise ValueError(f"{name}: {value!r}; allowed: {allowed}")
+    return low, high
 
 
 class _Transform:
-    """A transform that is applied with a probability. Its random numbers follow from `seed` and the number of the call, or from `rng` of the call."""
+    """A transform that is applied with a probability, with one thread in a worker process.
 
-    def __init__(self, p: float, seed: int) -> None:
-        if not 0 <= p <= 1:
+    Its random numbers follow from `seed`, the number of the call and, in a worker process, from which worker this is: the seed that PyTorch's `DataLoader`
+    gives the worker, another one in each epoch, else the name of the process. With `rng` of the call they follow from that alone.
+    """
+
+    def __init__(self, p: float, seed: int, options: dict[str, Any]) -> None:
+        self.p = _checks.number(p, "p", "0 to 1")
+        if not 0 <= self.p <= 1:
             raise ValueError(f"p: {p!r}; allowed: 0 to 1")
-        self.p = p
-        self.seed = seed
+        self.seed = _checks.whole(seed, "seed", "a whole number, 0 or more")
+        if self.seed < 0:
+            raise ValueError(f"seed: {seed!r}; allowed: a whole number, 0 or more")
+        self.options = options
         self._calls = 0
 
     def _generator(self, rng: np.random.Generator | None) -> np.random.Generator:
         if rng is not None:
             return rng
         self._calls += 1
-        return np.random.default_rng([self.seed, self._calls - 1])
+        return np.random.default_rng([self.seed, self._calls - 1, *_workers.seed_words()])
 
     def __call__(self, *, image: Any, depth: Any = None, rng: np.random.Generator | None = None, **others: Any) -> dict[str, Any]:
         """The transformed `image`; everything else unchanged. `rng` makes a call reproducible, whatever was called before."""
@@ -52,28 +63,14 @@ class _Transform:
         raise NotImplementedError
 
     def as_albumentations(self) -> Any:
-        """This transform as one of albumentations, for `albumentations.Compose`: `compose(image=image, depth=depth)`."""
-        import albumentations
+        """This transform as one of albumentations, for `albumentations.Compose`: `compose(image=image, depth=depth)`.
 
-        transform = self
+        With `Compose(..., additional_targets={"depth": "mask"})` the depth is flipped and cropped as the image is. Floats of albumentations are sRGB values
+        from 0 to 1: they get what their codes of 8 bits would get. Random numbers follow from the seed of `Compose`, and from which worker process this is.
+        """
+        from . import _albumentations
 
-        class OfBansho(albumentations.ImageOnlyTransform):
-            """A transform of Bansho within albumentations."""
-
-            @property
-            def targets_as_params(self) -> list[str]:
-                return []
-
-            def get_params_dependent_on_data(self, params: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
-                return {"depth": data.get("depth"), "word": self.py_random.getrandbits(63)}
-
-            def apply(self, img: Any, depth: Any = None, word: int = 0, **params: Any) -> Any:
-                return transform.apply(img, depth, np.random.default_rng(word))
-
-            def get_transform_init_args_names(self) -> tuple[str, ...]:
-                return ()
-
-        return OfBansho(p=self.p)
+        return _albumentations.WeatherTransform.of(self)
 
 
 class Rain(_Transform):
@@ -99,13 +96,13 @@ class Rain(_Transform):
 
         `visibility="augment"` is the default here, since physical rain by day is hardly seen; pass `visibility="physical"` for that.
         """
-        super().__init__(p, seed)
+        # `strength` alone says how strong it is.
+        super().__init__(p, seed, {"visibility": visibility if strength is None else None, "strength": strength, **options})
         self.rate_mm_per_h = _interval(rate_mm_per_h, "rate_mm_per_h")
         if self.rate_mm_per_h[0] <= 0:
             raise ValueError(f"rate_mm_per_h: {rate_mm_per_h!r}; allowed: rates above 0")
         self.wind_speed = _interval(wind_speed, "wind_speed")
         self.exposure_s = _interval(exposure_s, "exposure_s")
-        self.options = {"visibility": visibility if strength is None else None, "strength": strength, **options}
 
     def parameters(self, generator: np.random.Generator) -> dict[str, Any]:
         """What `bansho.rain` is called with: drawn from the generator, always in the same order."""
@@ -121,7 +118,7 @@ class Rain(_Transform):
 
     def apply(self, image: Any, depth: Any, generator: np.random.Generator) -> Any:
         """The image with rain."""
-        return weather.rain(image, depth, **{**self.options, **self.parameters(generator)})
+        return weather.rain(image, depth, **{"threads": _workers.default_threads(), **self.options, **self.parameters(generator)})
 
 
 class Fog(_Transform):
@@ -129,13 +126,13 @@ class Fog(_Transform):
 
     def __init__(self, visibility_m: Interval = (50.0, 1000.0), *, p: float = 1.0, seed: int = 0, **options: Any) -> None:
         """The logarithm of the visibility is drawn evenly. `options` are those of `bansho.fog`."""
-        super().__init__(p, seed)
+        super().__init__(p, seed, options)
         self.visibility_m = _interval(visibility_m, "visibility_m")
         if self.visibility_m[0] <= 0:
             raise ValueError(f"visibility_m: {visibility_m!r}; allowed: distances above 0")
-        self.options = options
 
     def apply(self, image: Any, depth: Any, generator: np.random.Generator) -> Any:
         """The image in fog."""
         low, high = np.log(self.visibility_m)
-        return weather.fog(image, depth, float(np.exp(generator.uniform(low, high))), **self.options)
+        visibility_m = float(np.exp(generator.uniform(low, high)))
+        return weather.fog(image, depth, visibility_m, **{"threads": _workers.default_threads(), **self.options})

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import threading
 import warnings
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _arrays, _bansho, _camera
+from . import _arrays, _bansho, _camera, _checks
 from .errors import PhysicalStrengthNotice
 from .scene import Scene
 
@@ -28,6 +29,8 @@ STRONGEST = 20.0
 """Largest strength."""
 ASSUMED_EV100 = 12.0
 """Exposure value at ISO 100 that is assumed of a picture: that of a street under heavy clouds."""
+MOST_FRAMES = 100_000
+"""Frames of the scene of a video whose length is not known."""
 REACH_M = 1000.0
 """How far from the camera it rains, m, unless `parameters` has another `airlight_distance`."""
 
@@ -44,16 +47,13 @@ class RainTruth:
     """Diameter of the drop of the nearest streak, mm; 0 where there is none."""
     transmission: NDArray[np.float32]
     """Fraction of the light of the picture that passes streaks and the medium."""
+    medium_transmission: NDArray[np.float32]
+    """Fraction of the light of the picture that passes the medium: all drops that are not streaks."""
 
     @property
     def streak_mask(self) -> NDArray[np.bool_]:
         """Where a streak covers at least 1 % of a pixel during the exposure."""
         return self.streak_opacity >= 0.01
-
-    @property
-    def medium_transmission(self) -> NDArray[np.float32]:
-        """Fraction of the light that passes the medium: all drops that are not streaks."""
-        return np.minimum(self.transmission / np.maximum(1 - self.streak_opacity, 1e-3), 1).astype(np.float32)
 
 
 class _Cache:
@@ -73,6 +73,12 @@ class _Cache:
             if len(self._shots) > self.MOST:
                 self._shots.popitem(last=False)
         return shot
+
+    def forget(self, shot: _bansho.PlateShot) -> None:
+        """Does not use a shot again."""
+        with self._lock:
+            for key in [key for key, cached in self._shots.items() if cached is shot]:
+                del self._shots[key]
 
     def after_fork(self) -> None:
         """In a child process: the shots of the parent are of no use, and its lock may be held by a thread that does not exist here."""
@@ -96,12 +102,15 @@ def augment_strength(exposure_s: float) -> float:
 
     The streak of a drop becomes fainter the longer the exposure is, since it covers a point of its path for D / (v T) of the time.
     """
-    (opacity,) = _bansho.streak_opacity([1.6], float(exposure_s))
+    exposure = _checks.number(exposure_s, "exposure_s", "a number of seconds above 0")
+    if exposure <= 0:
+        raise ValueError(f"exposure_s: {exposure_s!r}; allowed: a number of seconds above 0")
+    (opacity,) = _bansho.streak_opacity([1.6], exposure)
     return float(np.clip(AUGMENT_OPACITY / opacity, 1.0, STRONGEST))
 
 
 def _strength(strength: float | str | None, visibility: str | None, exposure_s: float) -> float:
-    if visibility not in (None, "physical", "augment"):
+    if not (visibility is None or isinstance(visibility, str) and visibility in ("physical", "augment")):
         raise ValueError(f'visibility: {visibility!r}; allowed: "physical", "augment"')
     if visibility == "augment":
         if strength is not None:
@@ -109,11 +118,13 @@ def _strength(strength: float | str | None, visibility: str | None, exposure_s: 
         return augment_strength(exposure_s)
     if strength is None and visibility is None:
         _notice()
-    if strength is None or strength == "physical":
+    if strength is None or isinstance(strength, str) and strength == "physical":
         return 1.0
-    if isinstance(strength, str) or not 0 < float(strength) <= STRONGEST:
-        raise ValueError(f'strength: {strength!r}; allowed: "physical", or a number above 0 up to {STRONGEST:g}')
-    return float(strength)
+    allowed = f'"physical", or a number above 0 up to {STRONGEST:g}'
+    factor = _checks.number(strength, "strength", allowed)
+    if not 0 < factor <= STRONGEST:
+        raise ValueError(f"strength: {strength!r}; allowed: {allowed}")
+    return factor
 
 
 _noticed = False
@@ -159,35 +170,44 @@ def rain_scene(
 ) -> Scene:
     """The scene that `bansho.rain` draws over a picture of `size` (height, width), whose plate is called `image` and its depth `depth`.
 
-    The program draws the same pixels from it. See `bansho.rain` for the parameters.
+    The program draws the same pixels from it. `pose` may be a sequence with one for each frame: the pose at the middle of its exposure. See `bansho.rain` for
+    the other parameters.
     """
-    height, width = size
+    sides = _checks.sides(size, "size")
+    if sides is None:
+        raise ValueError("size: None; allowed: (height, width)")
+    height, width = sides
+    rate = _rate(fps)
+    exposure = _checks.number(exposure_s, "exposure_s")
+    if parameters is not None and not isinstance(parameters, Mapping):
+        raise ValueError(f"parameters: {_checks.shortened(parameters)}; allowed: a dict of keys of [[rain]]")
     poses = _poses(pose)
-    plate: dict[str, Any] = {"image": "image", "depth": "depth" if depth else None, "exposure_ev100": _float(exposure_ev100, "exposure_ev100")}
+    plate: dict[str, Any] = {"image": "image", "depth": "depth" if depth else None, "exposure_ev100": _checks.number(exposure_ev100, "exposure_ev100")}
     if depth:
-        plate |= {"depth_kind": depth_kind, "depth_scale": None if depth_scale is None else float(depth_scale)}
+        plate |= {"depth_kind": depth_kind, "depth_scale": _depth_scale(depth_scale)}
     given: dict[str, Any] = {
-        "rate_mm_per_h": _float(rate_mm_per_h, "rate_mm_per_h"),
+        "rate_mm_per_h": _checks.number(rate_mm_per_h, "rate_mm_per_h"),
         "method": "drops",
-        "opacity_gain": _strength(strength, visibility, exposure_s),
+        "opacity_gain": _strength(strength, visibility, exposure),
         "airlight_distance": REACH_M,
-        "splashes": {"fraction": _float(splashes, "splashes")},
+        "splashes": {"fraction": _checks.number(splashes, "splashes")},
     }
     if not splashes:
         # What the picture shows ends the rain, not a level ground, of which nothing is known.
         given["ground_height"] = float(poses[0][1, 3]) - 1e4
+    view: dict[str, Any] = {
+        **_camera.pose_keys(poses, 1 / rate, exposure),
+        **_camera.intrinsics(camera, (height, width)),
+        "shutter_s": exposure,
+        # The lens of the picture has added its glare already.
+        "glare": 0.0,
+    }
     return Scene(
         {
-            "picture": {"size": [width, height], "frames": frames, "fps": _rate(fps), "seed": _seed(seed)},
-            "camera": {
-                **_camera.pose_keys(poses, 1 / fps),
-                **_camera.intrinsics(camera, size),
-                "shutter_s": _float(exposure_s, "exposure_s"),
-                # The lens of the picture has added its glare already.
-                "glare": 0.0,
-            },
+            "picture": {"size": [width, height], "frames": frames, "fps": rate, "seed": _checks.whole(seed, "seed", "a whole number from 0 to 9e15")},
+            "camera": view,
             "plate": plate,
-            "wind": {"velocity": [_float(component, "wind") for component in _vector(wind, "wind")], "gust": _float(gust, "gust")},
+            "wind": {"velocity": _checks.vector(wind, "wind"), "gust": _checks.number(gust, "gust")},
             "rain": [{**given, **(parameters or {})}],
         }
     )
@@ -196,37 +216,22 @@ def rain_scene(
 def _poses(pose: Any) -> list[NDArray[np.float64]]:
     if pose is None:
         return [_camera.level_pose()]
-    array = np.asarray(pose, dtype=np.float64)
+    array = _checks.numbers(pose, "pose", _camera.ALLOWED_POSE)
     if array.ndim == 3:
         return [_camera.checked_pose(matrix, f"pose {index}") for index, matrix in enumerate(array)]
     return [_camera.checked_pose(array)]
 
 
-def _float(value: Any, name: str) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: {value!r}; allowed: a number") from None
+def _depth_scale(scale: Any) -> float | None:
+    return None if scale is None else _checks.number(scale, "depth_scale", "a number of meters for each unit of the depth, or None")
 
 
-def _vector(value: Any, name: str) -> Sequence[Any]:
-    if np.shape(value) != (3,):
-        raise ValueError(f"{name}: an array of shape {np.shape(value)}; allowed: (x, y, z)")
-    return list(value)
-
-
-def _seed(seed: Any) -> int:
-    try:
-        whole = int(seed.__index__())
-    except AttributeError:
-        raise ValueError(f"seed: {seed!r}; allowed: a whole number from 0 to 9e15") from None
-    return whole
-
-
-def _rate(fps: float) -> float | int:
-    if not fps > 0:
+def _rate(fps: Any) -> float | int:
+    """Frames per second: a whole number where it is one, as a scene has it."""
+    rate = _checks.number(fps, "fps", "a number above 0")
+    if rate <= 0:
         raise ValueError(f"fps: {fps!r}; allowed: a number above 0")
-    return int(fps) if float(fps).is_integer() else float(fps)
+    return int(rate) if rate.is_integer() else rate
 
 
 def _draw(
@@ -239,10 +244,18 @@ def _draw(
     threads: int | None,
 ) -> tuple[NDArray[Any], RainTruth | None]:
     """Draws a frame of a scene over an image."""
-    shot = _cache.shot((*image.shape, depth is None), threads)
+    shot = _cache.shot((*image.shape, depth is None), _checks.threads(threads))
     encoding = "linear_srgb" if is_linear else "srgb"
     # Codes of 16 bits are floats that are encoded: their light is drawn, and encoded again.
-    drawn, values = shot.draw(scene.to_toml(), image, encoding, depth, number, truth)
+    try:
+        drawn, values = shot.draw(scene.to_toml(), image, encoding, depth, number, truth)
+    except ValueError:
+        # What was given is wrong; the shot is as it was.
+        raise
+    except BaseException:
+        # After an `InternalError` a shot refuses every later call, and other exceptions may leave it half changed.
+        _cache.forget(shot)
+        raise
     result = drawn if drawn.shape[2] == 3 else np.ascontiguousarray(drawn[..., : image.shape[2]])
     if image.dtype == np.uint8 and image.shape[2] == 4:
         result = np.dstack([result, image[..., 3]])
@@ -257,6 +270,7 @@ def _truth_of(values: Mapping[str, Any]) -> RainTruth:
         streak_depth=channels["rain.streak_depth"],
         diameter_mm=channels["rain.diameter_mm"],
         transmission=(1 - channels["rain.A"]).astype(np.float32),
+        medium_transmission=np.exp(-channels["rain.airlight_optical_depth"]).astype(np.float32),
     )
 
 
@@ -319,7 +333,7 @@ def rain(
     }
     if pixels.ndim != 4:
         return _rain_one(pixels, depth, {**options, "rate_mm_per_h": rate_mm_per_h, "seed": seed}, 0, truth, threads)
-    rates = np.broadcast_to(np.asarray(rate_mm_per_h, dtype=np.float64), (len(pixels),))
+    rates = _rates(rate_mm_per_h, len(pixels))
     depths = _each(depth, len(pixels))
     drawn = []
     for index, (picture, plane, rate) in enumerate(zip(pixels, depths, rates, strict=True)):
@@ -328,6 +342,15 @@ def rain(
     if not truth:
         return np.stack(drawn) if drawn else pixels.copy()
     return np.stack([picture for picture, _ in drawn]), [values for _, values in drawn]
+
+
+def _rates(rate_mm_per_h: Any, count: int) -> list[float]:
+    """A rain rate for each picture of a batch."""
+    allowed = "a number, or one for each image"
+    rates = _checks.numbers(rate_mm_per_h, "rate_mm_per_h", allowed)
+    if rates.shape not in ((), (count,)):
+        raise ValueError(f"rate_mm_per_h: an array of shape {rates.shape} for {count} images; allowed: {allowed}")
+    return np.broadcast_to(rates, (count,)).tolist()
 
 
 def _each(depth: Any, count: int) -> list[Any]:
@@ -359,11 +382,11 @@ def _rain_one(pixels: Any, depth: Any, options: dict[str, Any], number: int, tru
 
 
 def rain_video(
-    images: Sequence[ArrayLike] | ArrayLike,
-    depths: Sequence[ArrayLike] | ArrayLike | None = None,
+    images: Iterable[ArrayLike] | ArrayLike,
+    depths: Iterable[ArrayLike] | ArrayLike | None = None,
     *,
     fps: float,
-    poses: ArrayLike | None = None,
+    poses: Iterable[ArrayLike] | ArrayLike | None = None,
     truth: bool = False,
     threads: int | None = None,
     rate_mm_per_h: float = 20.0,
@@ -379,40 +402,112 @@ def rain_video(
     exposure_ev100: float = ASSUMED_EV100,
     splashes: float = 0.0,
     parameters: Mapping[str, Any] | None = None,
-) -> Any:
+) -> Iterator[Any]:
     """The same rain over the frames of a video: drops go on falling from frame to frame, and the camera moves between them.
 
-    `poses` (N, 4, 4) are those of the camera, one for each frame; without, it stands still. The exposure is half a frame by default. An iterator of pictures,
-    with `truth` of pairs: nothing is kept in memory.
+    :param images: pictures of one shape: a sequence, an array (N, H, W, 3), or an iterator, of which no more than one picture is in memory.
+    :param depths: one for each image, as a sequence or an iterator; or one array (H, W) for all.
+    :param poses: (N, 4, 4) or an iterator of 4 x 4, one for each image: that of the camera at the middle of the exposure. Between them it moves evenly, and before
+        the first and after the last as between those two that are nearest. `None` for a camera that stands still.
+    :param exposure_s: half a frame by default.
+
+    Returns an iterator of pictures, with `truth` of pairs. See `bansho.rain` for the other parameters.
     """
-    count = len(images)
-    if count == 0:
+    rate = _rate(fps)
+    # The camera of the scene needs all poses; images and depths are taken one by one.
+    matrices = None if poses is None else _checks.numbers(list(poses) if isinstance(poses, Iterator) else poses, "poses", "an array (N, 4, 4), one for each image")
+    count = _length(images)
+    if count is None and matrices is not None:
+        count = len(matrices) if matrices.ndim else 0
+    if matrices is not None and (matrices.shape != (count, 4, 4) or count == 0):
+        raise ValueError(f"poses: an array of shape {matrices.shape}; allowed: ({count or 'N'}, 4, 4), one for each image")
+    pictures = _in_order(images)
+    first_picture = next(pictures, None)
+    if first_picture is None:
         raise ValueError("images: none; allowed: one or more")
-    first, _ = _arrays.image(images[0], "images")
-    if poses is not None and np.shape(poses) != (count, 4, 4):
-        raise ValueError(f"poses: an array of shape {np.shape(poses)}; allowed: ({count}, 4, 4), one for each image")
+    first, _ = _arrays.image(first_picture, "images")
+    planes = _planes(depths, count)
+    try:
+        first_plane = next(planes)
+    except StopIteration:
+        raise ValueError("depths: none; allowed: one for each image, or None") from None
     options: dict[str, Any] = {"depth_kind": depth_kind, "depth_scale": depth_scale}
-    each = _each(depths, count)
+    size = (first.shape[0], first.shape[1])
     scene = rain_scene(
-        (first.shape[0], first.shape[1]),
+        size,
         rate_mm_per_h=rate_mm_per_h,
         camera=camera,
-        pose=poses,
-        exposure_s=0.5 / fps if exposure_s is None else exposure_s,
+        pose=matrices,
+        exposure_s=0.5 / rate if exposure_s is None else exposure_s,
         wind=wind,
         gust=gust,
         seed=seed,
         strength=strength,
         visibility=visibility,
-        depth=each[0] is not None,
+        depth=first_plane is not None,
         exposure_ev100=exposure_ev100,
         splashes=splashes,
         fps=fps,
-        frames=count,
+        frames=MOST_FRAMES if count is None else count,
         parameters=parameters,
         **options,
     )
-    return (_rain_one(images[number], each[number], options, number, truth, threads, scene) for number in range(count))
+    frames = _frames_of_video(itertools.chain([first_picture], pictures), itertools.chain([first_plane], planes), size, count)
+    return (_rain_one(picture, plane, options, number, truth, threads, scene) for number, (picture, plane) in enumerate(frames))
+
+
+def _length(values: Any) -> int | None:
+    """How many there are; `None` of an iterator."""
+    try:
+        return len(values)
+    except TypeError:
+        return None
+
+
+def _in_order(images: Any) -> Iterator[Any]:
+    """The images, each of which is asked for when it is drawn."""
+    count = _length(images)
+    if count is not None:
+        return (images[number] for number in range(count))
+    if not isinstance(images, Iterable):
+        raise ValueError(f"images: a {type(images).__name__}; allowed: a sequence, an array (N, height, width, 3), or an iterator of images")
+    return iter(images)
+
+
+def _planes(depths: Any, count: int | None) -> Iterator[Any]:
+    """The depths, each of which is asked for when it is drawn."""
+    if depths is None:
+        return itertools.repeat(None)
+    if isinstance(depths, Iterator):
+        return depths
+    if count is not None:
+        return iter(_each(depths, count))
+    if isinstance(depths, (list, tuple)):
+        return iter(depths)
+    planes = _arrays.as_numpy(depths, "depths")
+    return itertools.repeat(planes) if planes.ndim == 2 else iter(planes)
+
+
+def _frames_of_video(pictures: Iterator[Any], planes: Iterator[Any], size: tuple[int, int], count: int | None) -> Iterator[tuple[Any, Any]]:
+    """Each picture with its depth. That they are as the first ones is checked."""
+    drawn, has_depth = 0, True
+    for number, picture in enumerate(pictures):
+        if count is not None and number >= count:
+            raise ValueError(f"images: more than {count}; allowed: one for each pose")
+        shape = _arrays.as_numpy(picture, f"image {number}").shape
+        if shape[:2] != size:
+            raise ValueError(f"images: image {number} has the shape {shape}; allowed: {size[0]} x {size[1]} pixels, as the first")
+        try:
+            plane = next(planes)
+        except StopIteration:
+            raise ValueError(f"depths: {number} of them, and more images; allowed: one for each image") from None
+        has_depth = plane is not None if number == 0 else has_depth
+        if (plane is not None) != has_depth:
+            raise ValueError(f"depths: image {number} is {'without' if has_depth else 'with'} one, unlike the first; allowed: one for each image, or none")
+        yield picture, plane
+        drawn = number + 1
+    if count is not None and drawn < count:
+        raise ValueError(f"images: {drawn} for {count} poses; allowed: one for each pose")
 
 
 def rain_stereo(
@@ -435,7 +530,7 @@ def rain_stereo(
     """
     pose_left = _camera.level_pose() if pose is None else _camera.checked_pose(pose)
     pose_right = pose_left.copy()
-    pose_right[:3, 3] += _float(baseline_m, "baseline_m") * pose_left[:3, 0]
+    pose_right[:3, 3] += _checks.number(baseline_m, "baseline_m") * pose_left[:3, 0]
     common = {"strength": strength, "visibility": visibility, "truth": truth, "threads": threads, **options}
     return rain(left, depth_left, pose=pose_left, **common), rain(right, depth_right, pose=pose_right, **common)
 
@@ -462,13 +557,13 @@ def fog(
         raise ValueError("depth: None; allowed: an array (height, width), since fog is in front of what has a distance")
     size = (checked.shape[0], checked.shape[1])
     plane = _arrays.depth(depth, size, depth_kind, depth_scale)
-    scale = None if depth_scale is None else float(depth_scale)
+    scale = _depth_scale(depth_scale)
     scene = Scene(
         {
             "picture": {"size": [size[1], size[0]], "frames": 1},
-            "camera": {**_camera.pose_keys(_poses(pose), 1.0), **_camera.intrinsics(camera, size), "glare": 0.0},
+            "camera": {**_camera.pose_keys(_poses(pose)[:1]), **_camera.intrinsics(camera, size), "glare": 0.0},
             "plate": {"image": "image", "depth": "depth", "depth_kind": depth_kind, "depth_scale": scale, "exposure_ev100": ASSUMED_EV100},
-            "fog": {"visibility_m": _float(visibility_m, "visibility_m")},
+            "fog": {"visibility_m": _checks.number(visibility_m, "visibility_m")},
         }
     )
     return _draw(scene, checked, is_linear, plane, 0, False, threads)[0]

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use bansho_base::{
     camera::CameraParameters,
     color::MAX_EV100,
-    host::observer::Unobserved,
     image::Rect,
     math::DVec3,
     parameters::{Auto, Parameter, Parameters, Range, Reader},
@@ -241,8 +240,9 @@ impl LiveEffect {
         self.recycle();
         self.shot.replace_scene(Arc::new(compiled));
         if !is_in_preroll {
-            let (time, shot) = (self.time(), &mut self.shot);
-            self.pool.run(|| shot.advance_to(time, u64::MAX, &Unobserved))?;
+            let time = self.time();
+            let (shot, observer) = (&mut self.shot, self.observer.as_ref());
+            self.pool.run(|| shot.advance_to(time, u64::MAX, observer))?;
         }
         Ok(())
     }

@@ -4,7 +4,10 @@ use std::{fmt, sync::Arc};
 
 use bansho_base::{
     camera::CameraParameters,
-    host::assets::{Assets, MemoryAssets},
+    host::{
+        assets::{Assets, MemoryAssets},
+        observer::{Observer, Unobserved},
+    },
     parameters::{Auto, Parameters},
     tables::{PhenomenonTable, SharedTable},
     world::{air::Air, wind::WindParameters},
@@ -49,6 +52,7 @@ pub struct Effect {
     preroll_in_pieces: bool,
     pub(super) max_steps: u64,
     pub(super) pool: Pool,
+    observer: Arc<dyn Observer>,
 }
 
 impl fmt::Debug for Effect {
@@ -90,6 +94,7 @@ impl Effect {
             preroll_in_pieces: false,
             max_steps: DEFAULT_MAX_STEPS,
             pool: Pool::default(),
+            observer: Arc::new(Unobserved),
         }
     }
 
@@ -216,6 +221,12 @@ impl Effect {
         Self { assets, ..self }
     }
 
+    /// Sets who is asked during work whether to stop, from the preroll on: see [`LiveEffect::set_observer`].
+    #[must_use]
+    pub fn observer(self, observer: Arc<dyn Observer>) -> Self {
+        Self { observer, ..self }
+    }
+
     /// Most simulation steps of all phenomena together that one call of [`LiveEffect::advance`] takes, at least 1; what is left is owed. 60 by default. A
     /// particle flame takes about 120 steps a second.
     #[must_use]
@@ -263,13 +274,14 @@ impl Effect {
     /// Parameters that are out of range, not finite or contradict each other; a size that is not possible; assets that cannot be read.
     pub fn open(self) -> Result<LiveEffect, EffectError> {
         let scene = Arc::new(self.scene()?);
+        let options = PlanOptions { size: self.size, ..self.plan };
         let shot = self.pool.run(|| {
             let compiled = Arc::new(CompiledScene::build(scene, self.assets.clone(), None)?);
-            let mut plan = Plan::new(&compiled, &PlanOptions { size: self.size, ..self.plan.clone() })?;
+            let mut plan = Plan::observed(&compiled, &options, self.observer.as_ref())?;
             plan.fingerprint_frames = false;
             Ok::<Shot, EffectError>(Shot::open(compiled, Arc::new(plan)))
         })?;
-        let mut live = LiveEffect::new(shot, self.max_steps, self.pool);
+        let mut live = LiveEffect::new(shot, self.max_steps, self.pool, self.observer);
         if !self.preroll_in_pieces {
             live.preroll(u64::MAX)?;
             live.picture()?;

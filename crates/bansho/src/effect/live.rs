@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use bansho_base::{
-    camera::CameraParameters, frame::Frame, geometry::point_cloud::PointCloud, host::observer::Unobserved,
+    camera::CameraParameters, frame::Frame, geometry::point_cloud::PointCloud, host::observer::Observer,
     tables::PhenomenonTable,
 };
 use bansho_render::{PhenomenonLight, SceneLinear, Shot};
@@ -19,6 +19,8 @@ const MAX_TIME_S: f64 = 4e6;
 pub struct LiveEffect {
     pub(super) shot: Shot,
     pub(super) pool: Pool,
+    /// Asked during work whether to stop.
+    pub(super) observer: Arc<dyn Observer>,
     max_steps: u64,
     /// The picture of the current state; `None` before it is drawn, and after a change.
     frame: Option<Frame>,
@@ -39,10 +41,11 @@ impl fmt::Debug for LiveEffect {
 }
 
 impl LiveEffect {
-    pub(super) fn new(shot: Shot, max_steps: u64, pool: Pool) -> Self {
+    pub(super) fn new(shot: Shot, max_steps: u64, pool: Pool, observer: Arc<dyn Observer>) -> Self {
         Self {
             shot,
             pool,
+            observer,
             max_steps,
             frame: None,
             owed_s: 0.0,
@@ -50,6 +53,12 @@ impl LiveEffect {
             revision: 0,
             targets: BTreeMap::new(),
         }
+    }
+
+    /// Sets who is asked, at each step and strip of a picture, whether to stop. A call that is stopped returns [`RenderError::Cancelled`](bansho_render::RenderError::Cancelled)
+    /// within [`EffectError::Render`]; the effect is then at the time that it had reached.
+    pub fn set_observer(&mut self, observer: Arc<dyn Observer>) {
+        self.observer = observer;
     }
 
     /// Time of the current picture, at which its shutter opens, s. It begins at 0; in a loop of simulations it is the time within the loop.
@@ -69,8 +78,8 @@ impl LiveEffect {
     /// None at present: nothing is read and nothing can stop it.
     pub fn preroll(&mut self, max_steps: u64) -> Result<u64, EffectError> {
         let time = self.time();
-        let shot = &mut self.shot;
-        self.pool.run(|| shot.advance_to(time, max_steps, &Unobserved))?;
+        let (shot, observer) = (&mut self.shot, self.observer.as_ref());
+        self.pool.run(|| shot.advance_to(time, max_steps, observer))?;
         Ok(self.shot.preroll_steps_left())
     }
 
@@ -139,8 +148,8 @@ impl LiveEffect {
             return Ok(());
         }
         self.recycle();
-        let shot = &mut self.shot;
-        self.owed_s = self.pool.run(|| shot.advance_to(time, max_steps, &Unobserved))?;
+        let (shot, observer) = (&mut self.shot, self.observer.as_ref());
+        self.owed_s = self.pool.run(|| shot.advance_to(time, max_steps, observer))?;
         Ok(())
     }
 
@@ -157,15 +166,16 @@ impl LiveEffect {
         match is_restored {
             Some(state) => self.loop_start_state = Some(state),
             None => {
-                let shot = &mut self.shot;
+                let (shot, observer) = (&mut self.shot, self.observer.as_ref());
                 self.pool.run(|| {
                     shot.restart();
-                    shot.advance_to(0.0, u64::MAX, &Unobserved)
+                    shot.advance_to(0.0, u64::MAX, observer)
                 })?;
                 self.loop_start_state = Some(self.shot.snapshot());
             }
         }
-        self.pool.run(|| self.shot.advance_to(0.0, u64::MAX, &Unobserved))?;
+        let (shot, observer) = (&mut self.shot, self.observer.as_ref());
+        self.pool.run(|| shot.advance_to(0.0, u64::MAX, observer))?;
         Ok(())
     }
 
@@ -181,8 +191,8 @@ impl LiveEffect {
         let frame = match self.frame.take() {
             Some(frame) => frame,
             None => {
-                let shot = &mut self.shot;
-                self.pool.run(|| shot.draw(&SceneLinear, &Unobserved))?
+                let (shot, observer) = (&mut self.shot, self.observer.as_ref());
+                self.pool.run(|| shot.draw(&SceneLinear, observer))?
             }
         };
         let (time_s, owed_s) = (self.shot.time(), self.owed_s);
@@ -225,11 +235,11 @@ impl LiveEffect {
     pub fn restart(&mut self) -> Result<(), EffectError> {
         self.apply_targets_from_time_0()?;
         self.recycle();
-        let shot = &mut self.shot;
+        let (shot, observer) = (&mut self.shot, self.observer.as_ref());
         self.pool.run(|| {
             shot.restart();
             let start = shot.plan().time(shot.plan().frames().start);
-            shot.advance_to(start, u64::MAX, &Unobserved)
+            shot.advance_to(start, u64::MAX, observer)
         })?;
         self.owed_s = 0.0;
         Ok(())

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bansho_base::{
     color::{AlphaConvention, BitDepth, View},
     frame::DisplayPixels,
-    host::observer::Unobserved,
+    host::observer::Observer,
 };
 
 use crate::{
@@ -23,15 +23,15 @@ const CANDIDATES: i64 = 16;
 /// Offset in frames, from the beginning of the loop, of the candidate that differs least from the frame before it.
 ///
 /// 0 for what is simulated: its loops close in the middle of a crossfade, where frames differ little. Also 0 where a frame cannot be drawn;
-/// the error is reported when it is drawn for output.
-pub(crate) fn search(compiled: &Arc<CompiledScene>, plan: &Plan) -> i64 {
+/// the error is reported when it is drawn for output, and where the observer stops the work.
+pub(crate) fn search(compiled: &Arc<CompiledScene>, plan: &Plan, observer: &dyn Observer) -> i64 {
     if plan.loop_s().is_none() || compiled.is_stepped() {
         return 0;
     }
-    least_change(compiled, plan).unwrap_or_default()
+    least_change(compiled, plan, observer).unwrap_or_default()
 }
 
-fn least_change(compiled: &Arc<CompiledScene>, plan: &Plan) -> Result<i64, RenderError> {
+fn least_change(compiled: &Arc<CompiledScene>, plan: &Plan, observer: &dyn Observer) -> Result<i64, RenderError> {
     let frames = plan.frames();
     let count = frames.end - frames.start;
     let candidates = CANDIDATES.min(count);
@@ -40,8 +40,8 @@ fn least_change(compiled: &Arc<CompiledScene>, plan: &Plan) -> Result<i64, Rende
     let (mut differences, mut sum) = (Vec::with_capacity(offsets.len()), Difference::default());
     for offset in &offsets {
         let number = frames.start + offset;
-        let difference =
-            Difference::between(&draw_thumbnail(&mut shot, number - 1)?, &draw_thumbnail(&mut shot, number)?);
+        let before = draw_thumbnail(&mut shot, number - 1, observer)?;
+        let difference = Difference::between(&before, &draw_thumbnail(&mut shot, number, observer)?);
         sum.codes += difference.codes;
         sum.light += difference.light;
         differences.push(difference);
@@ -82,15 +82,15 @@ pub(crate) fn thumbnail_plan(plan: &Plan) -> Plan {
 }
 
 /// Display codes of a frame over black, from 0 to 1.
-pub(crate) fn draw_thumbnail(shot: &mut Shot, number: i64) -> Result<Vec<f64>, RenderError> {
-    shot.advance(number, &Unobserved)?;
+pub(crate) fn draw_thumbnail(shot: &mut Shot, number: i64, observer: &dyn Observer) -> Result<Vec<f64>, RenderError> {
+    shot.advance(number, observer)?;
     let target = DisplayOptions {
         view: View::DISPLAY,
         depth: BitDepth::Sixteen,
         alpha: AlphaConvention::Linear,
         over_black: false,
     };
-    let DisplayPixels::Sixteen(codes) = shot.draw(&target, &Unobserved)?.image.pixels else { return Ok(Vec::new()) };
+    let DisplayPixels::Sixteen(codes) = shot.draw(&target, observer)?.image.pixels else { return Ok(Vec::new()) };
     Ok(codes
         .into_iter()
         .flat_map(|[r, g, b, alpha]| [r, g, b].map(|code| f64::from(code) * f64::from(alpha) * CODE_STEP * CODE_STEP))

@@ -5,6 +5,8 @@ pub(crate) mod loop_start;
 
 use std::sync::Arc;
 
+use bansho_base::host::observer::{Observer, Unobserved};
+
 use crate::{
     compiled::CompiledScene,
     plan::{Plan, PlanError, PlanOptions},
@@ -17,9 +19,22 @@ impl Plan {
     /// # Errors
     /// The options do not fit the scene.
     pub fn new(compiled: &Arc<CompiledScene>, options: &PlanOptions) -> Result<Self, PlanError> {
+        Self::observed(compiled, options, &Unobserved)
+    }
+
+    /// As [`new`](Self::new), and asks `observer` whether to stop while the start of a loop is searched for. The plan of work that was stopped has a loop that
+    /// begins anywhere, and is of no use.
+    ///
+    /// # Errors
+    /// The options do not fit the scene.
+    pub fn observed(
+        compiled: &Arc<CompiledScene>,
+        options: &PlanOptions,
+        observer: &dyn Observer,
+    ) -> Result<Self, PlanError> {
         let mut plan = Self::with_exposure_and_loop_start(compiled.scene().clone(), options, 0.0, 0)?;
         plan.exposure_ev100 = exposure::choose(compiled, &plan);
-        plan.loop_start = loop_start::search(compiled, &plan);
+        plan.loop_start = loop_start::search(compiled, &plan, observer);
         Ok(plan)
     }
 }

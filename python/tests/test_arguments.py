@@ -1,0 +1,115 @@
+"""Arguments that are wrong: each is a `ValueError` that says what was given and what is allowed."""
+
+import numpy as np
+import pytest
+
+import bansho
+
+IMAGE = np.full((18, 32, 3), 60, np.uint8)
+DEPTH = np.full((18, 32), 9.0, np.float32)
+RAGGED = [[400, 0, 16], [0, 400], [0, 0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"image": "photograph.jpg"}, "image: a str; allowed: an array of numbers"),
+        ({"image": [[1, 2], [3]]}, "image: a list .*; allowed: an array of numbers of one shape"),
+        ({"strength": [1]}, r'strength: \[1\]; allowed: "physical", or a number above 0 up to 20'),
+        ({"strength": "strong"}, "strength: 'strong'; allowed: \"physical\", or a number"),
+        ({"strength": float("nan")}, 'strength: nan; allowed: "physical", or a number'),
+        ({"strength": None, "visibility": ["augment"]}, r"visibility: \['augment'\]; allowed: "),
+        ({"strength": None, "visibility": "augment", "exposure_s": 0}, "exposure_s: 0.0; allowed: a number of seconds above 0"),
+        ({"exposure_s": "long"}, "exposure_s: 'long'; allowed: a number"),
+        ({"exposure_s": float("nan")}, "exposure_s: nan; allowed: a number"),
+        ({"camera": RAGGED}, r"camera: \[\[400, 0, 16\], .*; allowed: a matrix K"),
+        ({"camera": "K"}, "camera: 'K'; allowed: a matrix K"),
+        ({"camera": [["f", 0, 1]] * 3}, "camera: .*; allowed: a matrix K"),
+        ({"pose": "level"}, "pose: 'level'; allowed: 4 x 4"),
+        ({"pose": [[1, 0], [0]]}, r"pose: \[\[1, 0\], \[0\]\]; allowed: 4 x 4"),
+        ({"pose": np.eye(3)}, r"pose: an array of shape \(3, 3\); allowed: 4 x 4"),
+        ({"wind": ((1, 2), 3)}, r"wind: .*; allowed: \(x, y, z\)"),
+        ({"wind": "west"}, r"wind: 'west'; allowed: \(x, y, z\)"),
+        ({"wind": (1, float("inf"), 0)}, "wind: inf; allowed: a number"),
+        ({"gust": "strong"}, "gust: 'strong'; allowed: a number"),
+        ({"depth_scale": "x"}, "depth_scale: 'x'; allowed: a number of meters"),
+        ({"depth_scale": float("nan")}, "depth_scale: nan; allowed: a number of meters"),
+        ({"depth_scale": 0.0}, "depth_scale: 0 is out of range; allowed: 0.000001 to 1000000 m"),
+        ({"rate_mm_per_h": [5, 20]}, r"rate_mm_per_h: \[5, 20\]; allowed: a number"),
+        ({"image": np.stack([IMAGE] * 3), "depth": None, "rate_mm_per_h": [5, 20]}, r"rate_mm_per_h: an array of shape \(2,\) for 3 images; allowed: a number, or one for each image"),
+        ({"image": np.stack([IMAGE] * 2), "depth": None, "rate_mm_per_h": "heavy"}, "rate_mm_per_h: 'heavy'; allowed: a number, or one for each image"),
+        ({"image": np.stack([IMAGE] * 2), "rate_mm_per_h": [[5], [6, 7]]}, "rate_mm_per_h: .*; allowed: a number, or one for each image"),
+        ({"seed": "7"}, "seed: '7'; allowed: a whole number"),
+        ({"threads": "all"}, "threads: 'all'; allowed: 1 to 1024"),
+        ({"threads": 1.5}, "threads: 1.5; allowed: 1 to 1024"),
+        ({"parameters": "distance"}, r"parameters: 'distance'; allowed: a dict of keys of \[\[rain\]\]"),
+        ({"exposure_ev100": None}, "exposure_ev100: None; allowed: a number"),
+    ],
+)
+def test_wrong_arguments_of_rain(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        bansho.rain(**{"image": IMAGE, "depth": DEPTH, "strength": "physical", **arguments})
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: bansho.rain_scene("big"), "size: 'big'; allowed: 2 whole numbers of pixels, none below 0"),
+        (lambda: bansho.rain_scene(None), r"size: None; allowed: \(height, width\)"),
+        (lambda: bansho.open({}, size="big"), "size: 'big'; allowed: 2 whole numbers of pixels"),
+        (lambda: bansho.open({}, size=64), "size: 64; allowed: 2 whole numbers of pixels"),
+        (lambda: bansho.open({}, size=(64, "x")), "size: 'x'; allowed: 2 whole numbers of pixels"),
+        (lambda: bansho.open({}, crop=(0, 0, 8)), r"crop: \(0, 0, 8\); allowed: 4 whole numbers of pixels"),
+        (lambda: bansho.open({}, seed="x"), "seed: 'x'; allowed: a whole number"),
+        (lambda: bansho.open({}, loop_s="x"), "loop_s: 'x'; allowed: a number of seconds"),
+        (lambda: bansho.fog(IMAGE, DEPTH, "thick"), "visibility_m: 'thick'; allowed: a number"),
+        (lambda: bansho.fog(IMAGE, DEPTH, depth_scale="x"), "depth_scale: 'x'; allowed: a number of meters"),
+        (lambda: bansho.fog(IMAGE, DEPTH, camera=RAGGED), "camera: .*; allowed: a matrix K"),
+        (lambda: bansho.rain_stereo(IMAGE, IMAGE, baseline_m="wide"), "baseline_m: 'wide'; allowed: a number"),
+        (lambda: bansho.augment_strength("x"), "exposure_s: 'x'; allowed: a number of seconds above 0"),
+        (lambda: bansho.datasets.RainPairs([IMAGE], per_image="two"), "per_image: 'two'; allowed: 1 or more"),
+        (lambda: bansho.datasets.AllSkyAurora(1.5), "count: 1.5; allowed: 1 or more"),
+        (lambda: next(bansho.datasets.iterate([1], workers="all")), "workers: 'all'; allowed: 0 or more"),
+    ],
+)
+def test_wrong_arguments_of_others(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+class NoBuffer:
+    """Has DLPack, and refuses."""
+
+    def __dlpack__(self, **options):
+        raise BufferError("it lies on another device")
+
+    def __dlpack_device__(self):
+        return (2, 0)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda effect: effect.linear(out=object()), r"out: a object \(.*\); allowed: an array \(height, width, 4\) of float32 in main memory"),
+        (lambda effect: effect.linear(out=[0.0] * 4), r"out: a list \(.*\); allowed: an array \(height, width, 4\) of float32"),
+        (lambda effect: effect.linear(out=NoBuffer()), r"out: a NoBuffer \(.*\); allowed: an array"),
+        (lambda effect: effect.depth(out="depth"), r"out: a str \(.*\); allowed: an array \(height, width\) of float32"),
+        (lambda effect: effect.display(out=bytes(40 * 30 * 4)), "out: cannot be written; allowed: a writable array"),
+        (lambda effect: effect.set_wind("west"), r"velocity: 'west'; allowed: \(x, y, z\)"),
+        (lambda effect: effect.set_wind(3), r"velocity: an array of shape \(\); allowed: \(x, y, z\)"),
+        (lambda effect: effect.set_wind((1, 0, 0), gust="strong"), "gust: 'strong'; allowed: a number"),
+        (lambda effect: effect.advance("1/60"), "dt: '1/60'; allowed: a number of seconds"),
+        (lambda effect: effect.at(None), "seconds: None; allowed: a number of seconds"),
+        (lambda effect: effect.set_size("big", 3), "width: 'big'; allowed: a whole number"),
+        (lambda effect: effect.set_exposure_ev100("bright"), "exposure_ev100: 'bright'; allowed: a number"),
+        (lambda effect: effect.move_to("flame_sheet", (1, 2)), r"position: an array of shape \(2,\); allowed: \(x, y, z\)"),
+        (lambda effect: effect.set_flow("flame_sheet", "full"), "flow: 'full'; allowed: a number"),
+        (lambda effect: bansho.Effect(bansho.FlameSheet(), size="big"), "size: 'big'; allowed: 2 whole numbers of pixels"),
+        (lambda effect: bansho.Effect(bansho.FlameSheet(), max_steps=1.5), "max_steps: 1.5; allowed: a whole number above 0"),
+    ],
+)
+def test_wrong_arguments_of_an_effect(call, message):
+    effect = bansho.Effect(bansho.FlameSheet(), size=(40, 30))
+    with pytest.raises(ValueError, match=message):
+        call(effect)
+    assert effect.advance(1 / 60) == 0
