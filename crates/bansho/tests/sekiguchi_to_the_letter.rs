@@ -252,6 +252,21 @@ fn the_literal_scenes_have_the_parameters_of_tables_3_2_and_3_3() {
         assert!(enabled && !scale_counts);
         assert_eq!((aurora.particles.lorentz_weight, aurora.particles.repulsion_weight), (0.6, 0.4));
     }
+    assert_measured!("time step, s", FRAME_S, 0.0333, 5e-5);
+    let fall = FALL_STEP_S * electron_speed_km_per_s(1e4);
+    assert_measured!("way of an electron of 10 keV in a step of the fall, km", fall, 193.0, 0.5);
+    assert_measured!("speed of an electron of 10 keV, km/s", electron_speed_km_per_s(1e4), 58_460.0, 5.0);
+}
+
+/// The small time step of table 3.2, s. The library takes the limit of short steps.
+const FALL_STEP_S: f64 = 0.0033;
+
+/// Speed of an electron with a kinetic energy in eV, by special relativity.
+fn electron_speed_km_per_s(energy_ev: f64) -> f64 {
+    const REST_ENERGY_EV: f64 = 510_998.95;
+    const LIGHT_KM_PER_S: f64 = 299_792.458;
+    let gamma = 1.0 + energy_ev / REST_ENERGY_EV;
+    LIGHT_KM_PER_S * (1.0 - 1.0 / (gamma * gamma)).sqrt()
 }
 
 #[test]

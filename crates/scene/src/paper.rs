@@ -2,7 +2,7 @@
 
 use bansho_base::{
     parameters::{Node, Parameters, Table, Value},
-    tables::PaperSetting,
+    tables::{PaperSetting, PaperValues},
 };
 
 use crate::{Scene, parse_values};
@@ -29,7 +29,7 @@ impl Scene {
     #[must_use]
     pub fn paper_departures(&self) -> Vec<PaperDeparture> {
         let mut departures: Vec<PaperDeparture> = Vec::new();
-        let whole = self.field_tables();
+        let whole = self.single_tables();
         let mut index_of_kind = std::collections::BTreeMap::new();
         for instance in &self.instances {
             let index = index_of_kind.entry(instance.kind.key).or_insert(0_usize);
@@ -37,17 +37,16 @@ impl Scene {
             *index += 1;
             let Some(paper) = instance.kind.paper.filter(|_| instance.enabled) else { continue };
             let table = instance.parameters.canonical();
-            let of_table = paper.settings.iter().filter_map(|setting| departure(&table, setting, &format!("{path}.")));
-            let of_scene = paper.scene_settings.iter().filter_map(|setting| departure(&whole, setting, ""));
+            let of_table = paper.settings.iter().flat_map(|setting| departing(&table, setting, &format!("{path}.")));
+            let of_scene = paper.scene_settings.iter().flat_map(|setting| departing(&whole, setting, ""));
             for (path, value, setting) in of_table.chain(of_scene) {
                 // Several phenomena may have the same paper.
                 if departures.iter().all(|departure| departure.path != path) {
-                    let allowed = setting.allowed.iter().map(|value| if value.is_empty() { "none" } else { value });
                     departures.push(PaperDeparture {
                         path,
                         value,
                         paper: paper.paper,
-                        allowed: allowed.collect::<Vec<_>>().join(" or "),
+                        allowed: setting.allowed.to_string(),
                         source_in_paper: setting.source,
                     });
                 }
@@ -56,24 +55,48 @@ impl Scene {
         departures
     }
 
-    /// The tables that are fields of the scene, by their keys.
-    fn field_tables(&self) -> Table {
+    /// The tables that are fields of the scene, and those that phenomena share and of which there is one, by their keys.
+    fn single_tables(&self) -> Table {
         let mut tables = Table::default();
         tables.push("picture", Value::Table(self.picture.to_table()));
         tables.push("camera", Value::Table(self.camera.to_table()));
+        for table in self.tables.iter().filter(|table| !table.kind.is_list()) {
+            tables.push(table.kind.key, Value::Table(table.parameters.canonical()));
+        }
         tables
     }
 }
 
-/// Path and value of a key whose value in `table` is not allowed.
-fn departure<'a>(table: &Table, setting: &'a PaperSetting, prefix: &str) -> Option<(String, String, &'a PaperSetting)> {
-    let value = table.at_path(setting.key);
-    let is_allowed = setting.allowed.iter().any(|allowed| match (value, parse(allowed)) {
-        (Some(value), Some(allowed)) => is_same(value, &allowed),
-        (value, allowed) => value.is_none() && allowed.is_none(),
-    });
-    let text = || value.map_or("none".to_owned(), short_text);
-    (!is_allowed).then(|| (format!("{prefix}{}", setting.key), text(), setting))
+/// Paths and values of a setting's key where its value in `table` is not allowed.
+fn departing<'a>(table: &Table, setting: &'a PaperSetting, prefix: &str) -> Vec<(String, String, &'a PaperSetting)> {
+    let mut values = Vec::new();
+    collect_values(table, setting.key, prefix.to_owned(), &mut values);
+    let departing = values.into_iter().filter(|(_, value)| !is_allowed(*value, &setting.allowed));
+    departing.map(|(path, value)| (path, value.map_or("none".to_owned(), short_text), setting)).collect()
+}
+
+/// The value of `key` with its path, which begins with `prefix`; of a key with `*`, those of all items of that list.
+fn collect_values<'a>(table: &'a Table, key: &str, prefix: String, values: &mut Vec<(String, Option<&'a Value>)>) {
+    let Some((list, of_item)) = key.split_once(".*.") else {
+        values.push((format!("{prefix}{key}"), table.at_path(key)));
+        return;
+    };
+    let Some(Value::List(items)) = table.at_path(list) else { return };
+    for (index, item) in items.iter().enumerate() {
+        if let Value::Table(item) = &item.value {
+            collect_values(item, of_item, format!("{prefix}{list}.{index}."), values);
+        }
+    }
+}
+
+fn is_allowed(value: Option<&Value>, allowed: &PaperValues) -> bool {
+    match allowed {
+        PaperValues::OneOf(texts) => texts.iter().any(|text| match (value, parse(text)) {
+            (Some(value), Some(allowed)) => is_same(value, &allowed),
+            (value, allowed) => value.is_none() && allowed.is_none(),
+        }),
+        PaperValues::AboveZero => value.and_then(Value::as_number).is_some_and(|number| number > 0.0),
+    }
 }
 
 /// A value in the syntax of scene files; `None` for an empty one.
@@ -101,14 +124,19 @@ fn short_text(value: &Value) -> String {
     }
 }
 
+/// Papers print four digits of a number at most, such as 0.0333 s for 1/30 s.
+const ROUNDING: f64 = 2e-3;
+
 /// Whether two values are the same, wherever they were written.
 fn is_same(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::List(a), Value::List(b)) => {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_same(&a.value, &b.value))
         }
-        (Value::Integer(_) | Value::Number(_), Value::Integer(_) | Value::Number(_)) => a.as_number() == b.as_number(),
-        _ => a == b,
+        (a, b) => match (a.as_number(), b.as_number()) {
+            (Some(a), Some(b)) => (a - b).abs() <= ROUNDING * b.abs(),
+            _ => a == b,
+        },
     }
 }
 

@@ -11,7 +11,7 @@ mod shared;
 use crate::parameters::{Parameter, Parameters, TableDescriptor};
 
 pub use self::{
-    paper::{PaperSetting, PaperSettings},
+    paper::{PaperSetting, PaperSettings, PaperValues},
     parameters::TableParameters,
     phenomenon::{BuildContext, ClonePhenomenonTable, PhenomenonTable, ReadPhenomenon},
     shared::{

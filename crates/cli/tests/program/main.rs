@@ -6,6 +6,7 @@ mod crate_dependencies;
 mod farm;
 mod input;
 mod output;
+mod papers;
 mod phenomena;
 mod plot;
 mod robustness;
