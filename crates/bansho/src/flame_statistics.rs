@@ -16,12 +16,14 @@
 //! assert_eq!(mask.extent(0), Some([1, 1]));
 //! ```
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
     color::{encode_srgb, srgb_from_acescg},
+    host::observer::Observer,
     image::Image,
 };
+use bansho_render::{CompiledScene, Plan, RenderError, Shot};
 
 /// Linear red above which a pixel is lit; 1 is display white.
 pub const LIT: f32 = 0.02;
@@ -159,6 +161,42 @@ impl FlameMask {
     }
 }
 
+/// The lit pixels of a frame of a film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmFrame {
+    /// Its number.
+    pub number: i64,
+    /// Its lit pixels.
+    pub mask: FlameMask,
+}
+
+/// Draws `count` frames of a plan, its first and others at equal distances, `height` pixels high, and finds their lit pixels. There are fewer if the plan has
+/// fewer.
+///
+/// # Errors
+/// A frame cannot be drawn.
+pub fn draw_film(
+    compiled: Arc<CompiledScene>,
+    plan: &Plan,
+    count: usize,
+    height: usize,
+    observer: &dyn Observer,
+) -> Result<Vec<FilmFrame>, RenderError> {
+    let [full_width, full_height] = plan.size();
+    let width = (full_width * height).div_ceil(full_height).max(1);
+    let frames = plan.frames();
+    let length = (frames.end - frames.start).max(1);
+    let count = i64::try_from(count).unwrap_or(i64::MAX).min(length);
+    let mut shot = Shot::open(compiled, Arc::new(plan.at_size([width, height])));
+    let numbers = (0..count).map(|index| frames.start + index * length / count);
+    numbers
+        .map(|number| {
+            let frame = crate::draw(&mut shot, number, observer)?;
+            Ok(FilmFrame { number, mask: FlameMask::new(&frame.beauty) })
+        })
+        .collect()
+}
+
 /// Means over the frames of a film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlameStatistics {
@@ -182,19 +220,29 @@ impl FlameStatistics {
     /// The statistics of frames of one size; `None` if all are dark. Means leave out frames in which there is nothing to measure.
     #[must_use]
     pub fn new(masks: &[FlameMask]) -> Option<Self> {
-        let base = masks.iter().filter_map(FlameMask::base).max()?;
+        Self::of_masks(&masks.iter().collect::<Vec<_>>())
+    }
+
+    /// The statistics of a film that was drawn; `None` if it is dark.
+    #[must_use]
+    pub fn of_film(frames: &[FilmFrame]) -> Option<Self> {
+        Self::of_masks(&frames.iter().map(|frame| &frame.mask).collect::<Vec<_>>())
+    }
+
+    fn of_masks(masks: &[&FlameMask]) -> Option<Self> {
+        let base = masks.iter().filter_map(|mask| mask.base()).max()?;
         let frames_with_flame = |row: usize| masks.iter().filter(|mask| mask.extent(row).is_some()).count();
         let top = (0..=base).find(|row| 2 * frames_with_flame(*row) >= masks.len()).unwrap_or(base);
         let lower_third = base - (base - top) / 3..base;
-        let rows = masks.iter().map(FlameMask::height).max().unwrap_or(0);
+        let rows = masks.iter().map(|mask| mask.height()).max().unwrap_or(0);
         Some(Self {
             height: ratio(base - top, rows),
             body: mean(masks.iter().map(|mask| mask.filled(lower_third.clone()))),
             pieces: mean(masks.iter().map(|mask| mask.pieces() as f64)),
-            edge_redness: mean(masks.iter().map(FlameMask::edge_redness)),
-            base_width: mean(masks.iter().map(FlameMask::base_width)),
-            pale: mean(masks.iter().map(FlameMask::pale)),
-            area: mean(masks.iter().map(FlameMask::area)),
+            edge_redness: mean(masks.iter().map(|mask| mask.edge_redness())),
+            base_width: mean(masks.iter().map(|mask| mask.base_width())),
+            pale: mean(masks.iter().map(|mask| mask.pale())),
+            area: mean(masks.iter().map(|mask| mask.area())),
         })
     }
 }

@@ -1,10 +1,8 @@
 //! Statistics of the flame in a scene, over its frames.
 
-use std::sync::Arc;
-
 use bansho::{
-    Plan, PlanOptions, Shot, Unobserved,
-    flame_statistics::{FlameMask, FlameStatistics},
+    Plan, PlanOptions, Unobserved,
+    flame_statistics::{FilmFrame, FlameStatistics, draw_film},
     job::{JobError, SceneFile},
 };
 
@@ -59,29 +57,17 @@ impl MeasuredFlame {
 pub(crate) fn measure(file: &SceneFile, count: usize, height: usize) -> anyhow::Result<MeasuredFlame> {
     let compiled = file.compile(file.parse()?, &file.assets())?;
     let plan = Plan::new(&compiled, &PlanOptions::default()).map_err(JobError::from)?;
-    let [full_width, full_height] = plan.size();
-    let width = (full_width * height).div_ceil(full_height).max(1);
-    let plan = plan.at_size([width, height]);
-    let shot_frames = plan.frames();
-    let length = (shot_frames.end - shot_frames.start).max(1);
-    let count = count.min(usize::try_from(length).unwrap_or(usize::MAX));
-    let numbers: Vec<i64> = (0..count as i64).map(|index| shot_frames.start + index * length / count as i64).collect();
-    let mut shot = Shot::open(compiled, Arc::new(plan));
-    let mut masks = Vec::with_capacity(count);
-    for number in &numbers {
-        let frame = bansho::draw(&mut shot, *number, &Unobserved).map_err(JobError::from)?;
-        masks.push(FlameMask::new(&frame.beauty));
-    }
-    let dark = || PlotError::NoFlame { scene: file.name.clone(), frames: count };
-    let film = FlameStatistics::new(&masks).ok_or_else(dark)?;
+    let frames = draw_film(compiled, &plan, count, height, &Unobserved).map_err(JobError::from)?;
+    let dark = || PlotError::NoFlame { scene: file.name.clone(), frames: frames.len() };
+    let film = FlameStatistics::of_film(&frames).ok_or_else(dark)?;
     let mut table = FigureTable::of_functions("frame", COLUMNS.iter().map(|(name, _)| (*name).to_owned()));
-    for (number, mask) in numbers.iter().zip(&masks) {
+    for FilmFrame { number, mask } in &frames {
         let pieces = mask.pieces() as f64;
         let row = [mask.lit_height(), mask.area(), pieces, mask.pale(), mask.base_width(), mask.edge_redness()];
         table.push(*number as f64, row);
     }
     let figure = Figure { title: format!("Statistics of the flame in {}", file.name), panels: panels(&table), table };
-    Ok(MeasuredFlame { figure, film, frames: count })
+    Ok(MeasuredFlame { figure, film, frames: frames.len() })
 }
 
 /// A plot for each column.
