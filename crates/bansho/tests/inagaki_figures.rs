@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use bansho::{
     CompiledScene, Plan, PlanOptions, Shot, Unobserved,
-    base::{color, frame::Frame, geometry::point_cloud::Quantity, math},
+    base::{assert_measured, color, frame::Frame, geometry::point_cloud::Quantity, math},
     media::assets::FileAssets,
 };
 
@@ -50,6 +50,7 @@ fn three_thousand_particles_are_densest_at_the_burner_in_every_frame() {
     let scene = figure("7");
     let mut shot = shot(&scene, &text(&scene), SMALL, false);
     let mut smallest_ratio = f64::INFINITY;
+    let mut dense_frames = 0;
     for number in 0..240 {
         shot.advance(number, &Unobserved).unwrap();
         let gas = shot.particles();
@@ -66,12 +67,17 @@ fn three_thousand_particles_are_densest_at_the_burner_in_every_frame() {
         let others = means[1..].iter().copied().fold(0.0, f64::max);
         smallest_ratio = smallest_ratio.min(means[0] / others);
         assert!(means[0] > others, "frame {number}: {means:?} kg/m^3");
+        dense_frames += 1;
         // It spreads all the way up.
         assert!(means[0] > 5.0 * means[BINS - 1], "frame {number}: {means:?} kg/m^3");
         if number == 40 {
-            assert!((means[0] - 0.145).abs() < 0.005 && (means[1] - 0.106).abs() < 0.005, "{means:.4?} kg/m^3");
+            assert_measured!("figure 7: density of the lowest tenth, kg/m^3", means[0], 0.145, 0.005);
+            assert_measured!("figure 7: density of the tenth above it, kg/m^3", means[1], 0.106, 0.005);
         }
     }
+    assert_measured!("figure 7 & section 6.2: frames", f64::from(dense_frames), 240.0, 0.0);
+    let particles = shot.particles().positions.len() as f64;
+    assert_measured!("figure 8 & section 6.2: particles", particles, 3000.0, 0.0);
     assert!(smallest_ratio > 1.15, "{smallest_ratio}");
 }
 
@@ -101,8 +107,8 @@ fn wind_to_the_left_and_to_the_right_moves_the_light_to_that_side() {
         (to_the_left - 184.0).abs() < 15.0 && (to_the_right - 203.0).abs() < 15.0,
         "{to_the_left} {to_the_right} from {still}"
     );
-    bansho::base::assert_measured!("light of the upper half to the left, pixels", to_the_left, 187.0, 0.5);
-    bansho::base::assert_measured!("light of the upper half to the right, pixels", to_the_right, 214.0, 0.5);
+    assert_measured!("figure 9: light of the upper half to the left, pixels", to_the_left, 187.0, 0.5);
+    assert_measured!("figure 10: light of the upper half to the right, pixels", to_the_right, 214.0, 0.5);
 }
 
 /// Largest and mean displacement of what is far behind the gas, pixels at full size: mean of the pixels that are displaced at all.
@@ -128,14 +134,14 @@ fn haze_displaces_tens_of_pixels_when_exaggerated_and_two_by_physics() {
     let [strong, physical, none] = ["6", "6_physical", "5"].map(displacement);
     assert!((strong[0] - 38.2).abs() < 2.0 && (strong[1] - 2.45).abs() < 0.2, "{strong:?}");
     assert!((physical[0] - 1.9).abs() < 0.2 && (physical[1] - 0.34).abs() < 0.04, "{physical:?}");
-    assert_eq!(none[0], 0.0);
-    bansho::base::assert_measured!("largest displacement, pixels", strong[0], 38.5, 0.05);
-    bansho::base::assert_measured!("mean displacement, pixels", strong[1], 2.5, 0.06);
-    bansho::base::assert_measured!("largest displacement by physics, pixels", physical[0], 1.9, 0.05);
-    bansho::base::assert_measured!("mean displacement by physics, pixels", physical[1], 0.3, 0.05);
+    assert_measured!("figure 5: displacement, pixels", none[0], 0.0, 0.0);
+    assert_measured!("figure 4 & figure 6: largest displacement, pixels", strong[0], 38.5, 0.05);
+    assert_measured!("figure 6: mean displacement, pixels", strong[1], 2.5, 0.06);
+    assert_measured!("figure 6: largest displacement by physics, pixels", physical[0], 1.9, 0.05);
+    assert_measured!("figure 6: mean displacement by physics, pixels", physical[1], 0.3, 0.05);
     // 42 degrees are 720 pixels.
     let focal = 360.0 / math::tan(21.0_f64.to_radians());
-    bansho::base::assert_measured!("largest deflection, rad", strong[0] / focal, 0.041, 5e-4);
+    assert_measured!("figure 4: largest deflection, rad", strong[0] / focal, 0.041, 5e-4);
     let [without, with] = ["5", "6"].map(|number| frames(&figure(number), &[40], false).remove(0));
     let changed = light(&with).iter().zip(light(&without)).map(|(a, b)| (a - b).abs() > 0.02).collect::<Vec<_>>();
     let columns = |range: std::ops::Range<usize>| {
@@ -143,6 +149,31 @@ fn haze_displaces_tens_of_pixels_when_exaggerated_and_two_by_physics() {
     };
     assert!(columns(100..220) > 300, "{}", columns(100..220));
     assert_eq!((columns(0..60), columns(280..320)), (0, 0));
+}
+
+/// The brightest light that the flame adds to its uppermost tenth; 1 is display white.
+fn light_at_the_top(scene: &str) -> f64 {
+    let still = text(scene).replace("heat_haze_gain = 60.0", "heat_haze_gain = 0.0");
+    let dark = still.replacen("opacity = 0.0007", "opacity = 0.0", 1);
+    assert_ne!(dark, still, "{scene}");
+    let drawn =
+        |text: &str, frame| light(&bansho::draw(&mut shot(scene, text, SMALL, false), frame, &Unobserved).unwrap());
+    let (with, without) = (drawn(&still, 40), drawn(&dark, 0));
+    let added: Vec<f64> = with.iter().zip(without).map(|(with, without)| with - without).collect();
+    let rows: Vec<f64> = added.chunks(SMALL[0]).map(|row| row.iter().copied().fold(0.0, f64::max)).collect();
+    let is_lit = |light: &f64| *light > 0.002;
+    let top = rows.iter().position(is_lit).unwrap();
+    let base = rows.iter().rposition(is_lit).unwrap();
+    rows[top..top + (base - top) / 10].iter().copied().fold(0.0, f64::max)
+}
+
+/// With the former opacity, 0.002, the light is 2.9 times as bright, and the flame ends in an edge.
+#[test]
+fn the_flames_fade_before_their_oldest_particles_are_removed() {
+    assert_measured!("light at the top of figure 8", light_at_the_top(&figure("8")), 0.041, 0.003);
+    assert_measured!("light at the top of figure 9", light_at_the_top(&figure("9")), 0.039, 0.003);
+    assert_measured!("light at the top of figure 10", light_at_the_top(&figure("10")), 0.021, 0.003);
+    assert_measured!("light at the top of inagaki_paper", light_at_the_top("inagaki_paper.toml"), 0.040, 0.003);
 }
 
 #[test]
@@ -159,9 +190,9 @@ fn the_papers_flame_has_the_color_of_its_temperature() {
     assert!((x - expected_x).abs() < 1e-3 && (y - expected_y).abs() < 1e-3);
     // Planck at 1900 K with the CIE 1931 observer, computed independently.
     assert!((x - 0.537_777).abs() < 1e-3 && (y - 0.411_202).abs() < 1e-3, "{x} {y}");
-    bansho::base::assert_measured!("x at 1900 K", x, 0.5378, 0.001);
-    bansho::base::assert_measured!("y at 1900 K", y, 0.4112, 0.001);
-    bansho::base::assert_measured!("z at 1900 K", 1.0 - x - y, 0.0510, 0.002);
+    assert_measured!("equation (13) & equation (14): x at 1900 K", x, 0.5378, 0.001);
+    assert_measured!("equation (13) & equation (15): y at 1900 K", y, 0.4112, 0.001);
+    assert_measured!("equation (16): z at 1900 K", 1.0 - x - y, 0.0510, 0.002);
 }
 
 /// CIE x and y of an ACEScg color.
