@@ -1,6 +1,7 @@
 //! The four papers, item by item: each page of the book in `docs/src/papers` has a table of every numbered equation, figure, table and item of future work.
 //! Every row names a scene, a command or a function that exists, a number, a test that measures it, and whether it is done or why not. Its numbers are those
-//! of the test: `cargo test -- --nocapture` prints what was measured.
+//! of the test: `cargo test -- --nocapture` prints what was measured. A test asserts a number by `assert_measured!("figure 2.14: quantity", ...)`, under the
+//! name of its row, and the row states that number.
 
 #[path = "support/sources.rs"]
 mod sources;
@@ -78,7 +79,7 @@ fn the_numbers_of_a_row_are_those_of_its_tests() {
     for paper in &PAPERS {
         for row in rows(paper) {
             let tests = code(&row.test);
-            // What a command prints depends on the machine.
+            // What a command prints depends on the machine; the tests of the program run it.
             if tests.is_empty() || tests.iter().any(|test| test.starts_with("bansho ")) {
                 continue;
             }
@@ -93,6 +94,125 @@ fn the_numbers_of_a_row_are_those_of_its_tests() {
         }
     }
     report(faults);
+}
+
+#[test]
+fn rows_state_the_values_that_tests_assert_under_their_names() {
+    let files: Vec<String> = rust_files(&Path::new(ROOT).join("crates")).iter().map(|file| read(file)).collect();
+    let (mut faults, mut unnamed) = (Vec::new(), BTreeSet::new());
+    for paper in &PAPERS {
+        for row in rows(paper).into_iter().filter(|row| row.state == "done") {
+            let tests = code(&row.test);
+            // What a command prints depends on the machine; the tests of the program run it.
+            if tests.iter().any(|test| test.starts_with("bansho ")) {
+                continue;
+            }
+            let mut asserted = Vec::new();
+            for test in &tests {
+                for file in files.iter().filter(|file| has_test(file, test)) {
+                    asserted.extend(
+                        assertions(&with_helpers(file, test)).into_iter().filter(|found| found.is_of(&row.item)),
+                    );
+                }
+            }
+            if asserted.is_empty() {
+                unnamed.insert((paper.name, row.item.clone()));
+            }
+            let stated = page_numbers(&row.measured);
+            for Assertion { name, value, tolerance } in asserted {
+                // Of a difference that is asserted to be 0 the row states the bound.
+                let shown = if value == Some(0.0) && !stated.contains(&0.0) { tolerance } else { value };
+                match shown {
+                    None => faults.push(format!("{}: `{name}`: its value is not a number in the source", paper.name)),
+                    Some(value) if stated.iter().any(|number| is_same_number(value, *number)) => {}
+                    Some(value) => {
+                        faults
+                            .push(format!("{}: {}: the row does not state {value} of `{name}`", paper.name, row.item));
+                    }
+                }
+            }
+        }
+    }
+    let listed: BTreeSet<(&str, String)> =
+        WITHOUT_NAME.iter().flat_map(|(paper, items)| items.iter().map(|item| (*paper, (*item).to_owned()))).collect();
+    let list = |rows: Vec<&(&str, String)>, what: &str| -> Vec<String> {
+        rows.iter().map(|(paper, item)| format!("{paper}: {item}: {what}")).collect()
+    };
+    faults.extend(list(unnamed.difference(&listed).collect(), "no test asserts a number under its name"));
+    faults.extend(list(listed.difference(&unnamed).collect(), "is listed, but has a number under its name, or no row"));
+    report(faults);
+}
+
+/// Rows whose tests do not yet assert their numbers under their names, by paper. It may only become shorter.
+const WITHOUT_NAME: &[(&str, &[&str])] = &[
+    ("inagaki", &["section 6: mouse drag"]),
+    ("yoshida_dobashi_yamamoto", &["future work: scattering", "future work: splashes"]),
+    ("sekiguchi", &["figure 3.1", "figure 3.2", "figure 3.3", "table 2.1"]),
+];
+
+/// What `assert_measured!` asserts.
+#[derive(Debug, PartialEq)]
+struct Assertion {
+    /// `ITEM: QUANTITY`, or `ITEM & ITEM: QUANTITY`; with `{}` where it is formatted.
+    name: String,
+    /// The value that the book states; `None` if it is not written as a number or a constant.
+    value: Option<f64>,
+    /// By how much the found value may differ.
+    tolerance: Option<f64>,
+}
+
+impl Assertion {
+    /// Whether it is a number of the row of an item.
+    fn is_of(&self, item: &str) -> bool {
+        let items = self.name.rsplit_once(": ").map(|(items, _)| items);
+        items.is_some_and(|items| items.split(" & ").any(|name| name == item))
+    }
+}
+
+/// The assertions of numbers of the book in a source.
+fn assertions(source: &str) -> Vec<Assertion> {
+    let calls = source.split("assert_measured!(").skip(1);
+    calls.filter_map(|call| assertion(&arguments(call), source)).collect()
+}
+
+/// The assertion with these arguments of `assert_measured!`.
+fn assertion(arguments: &[&str], source: &str) -> Option<Assertion> {
+    let [name, _, value, tolerance, ..] = arguments else { return None };
+    let name = name.split('"').nth(1)?.to_owned();
+    let literal = |text: &str| {
+        let digits = text.trim_start_matches('-');
+        numbers(text).first().copied().filter(|_| digits.starts_with(|letter: char| letter.is_ascii_digit()))
+    };
+    let constant = |name: &str| {
+        let (_, declaration) = source.split_once(&format!("const {name}: f64 = "))?;
+        literal(declaration.split(';').next()?)
+    };
+    let number = |text: &str| literal(text).or_else(|| constant(text));
+    Some(Assertion { name, value: number(value), tolerance: number(tolerance) })
+}
+
+/// The arguments of a call whose text begins after its opening parenthesis.
+fn arguments(call: &str) -> Vec<&str> {
+    let (mut depth, mut in_text, mut start) = (0, false, 0);
+    let mut arguments = Vec::new();
+    for (index, letter) in call.char_indices() {
+        match letter {
+            '"' => in_text = !in_text,
+            _ if in_text => {}
+            '(' | '[' | '{' => depth += 1,
+            ')' if depth == 0 => {
+                arguments.push(call[start..index].trim());
+                break;
+            }
+            ')' | ']' | '}' => depth -= 1,
+            ',' if depth == 0 => {
+                arguments.push(call[start..index].trim());
+                start = index + 1;
+            }
+            _ => {}
+        }
+    }
+    arguments
 }
 
 fn report(faults: Vec<String>) {
@@ -217,8 +337,19 @@ fn is_scene(path: &str) -> bool {
     Path::new(ROOT).join(path).is_file()
 }
 
-/// The numbers of a text that are not among the known ones, nor their percentages. Code, powers and numbers of equations in parentheses do not count.
+/// The numbers of a text that are not among the known ones, nor their percentages.
 fn unknown_numbers(text: &str, known: &[f64]) -> Vec<f64> {
+    let is_known = |number: &f64| known.iter().any(|known| is_same_number(*known, *number));
+    page_numbers(text).into_iter().filter(|number| !is_known(number)).collect()
+}
+
+/// Whether a number of a page is that of a test, or its percentage.
+fn is_same_number(in_test: f64, on_page: f64) -> bool {
+    [1.0, 100.0, 0.01].iter().any(|unit| (in_test.abs() * unit - on_page).abs() < 1e-9 * on_page.max(1.0))
+}
+
+/// The numbers of a page's text. Code, powers and numbers of equations in parentheses do not count.
+fn page_numbers(text: &str) -> Vec<f64> {
     let prose: String = text.split('`').step_by(2).collect();
     let is_equation = |part: &str| part.chars().all(|letter| letter.is_ascii_digit() || letter == '.');
     let prose: Vec<&str> = prose.split(['(', ')']).filter(|part| !is_equation(part)).collect();
@@ -227,12 +358,7 @@ fn unknown_numbers(text: &str, known: &[f64]) -> Vec<f64> {
     let is_digit = |index: usize| letters.get(index).is_some_and(char::is_ascii_digit);
     let is_separator = |index: usize| letters[index] == ',' && index > 0 && is_digit(index - 1) && is_digit(index + 1);
     let prose: String = (0..letters.len()).filter(|index| !is_separator(*index)).map(|index| letters[index]).collect();
-    let is_known = |number: &f64| {
-        let is_same =
-            |known: &f64| [1.0, 100.0, 0.01].iter().any(|unit| (known * unit - number).abs() < 1e-9 * number.max(1.0));
-        known.iter().any(is_same)
-    };
-    numbers(&prose).into_iter().filter(|number| !is_known(number)).collect()
+    numbers(&prose)
 }
 
 /// The numbers of a text, without their signs; not those within words.
@@ -341,6 +467,21 @@ mod checks {
         let unknown = |text: &str| unknown_numbers(text, &known);
         assert_eq!(unknown("1,280 pixels, 89 % and 0.5 of 240, within 1e-4 by (2.25) and `n = 3`"), [0.0; 0]);
         assert_eq!(unknown("-7 km, 0.6 or T1"), [7.0, 0.6]);
+    }
+
+    #[test]
+    fn assertions_are_read_with_their_names_and_values() {
+        let source = "const WIDE: f64 = 1_280.0;\nassert_measured!(\"figure 1 & table 2: width, m\", f(a, [b, c]), -0.5, 1e-3);\n\
+                      bansho_base::assert_measured!(format!(\"figure 1: {name}\"), x, WIDE, 0.0);\nassert_measured!(\"a\", x, stated, 0.0);\n";
+        let found = assertions(source);
+        let values: Vec<Option<f64>> = found.iter().map(|assertion| assertion.value).collect();
+        assert_eq!(values, [Some(0.5), Some(1280.0), None]);
+        assert_eq!(found[0].tolerance, Some(1e-3));
+        let of = |item: &str| found.iter().map(|assertion| assertion.is_of(item)).collect::<Vec<_>>();
+        assert_eq!(of("figure 1"), [true, true, false]);
+        assert_eq!(of("table 2"), [true, false, false]);
+        assert_eq!(of("figure 12"), [false; 3]);
+        assert!(is_same_number(0.97, 97.0) && is_same_number(-7.0, 7.0) && !is_same_number(0.97, 98.0));
     }
 
     #[test]

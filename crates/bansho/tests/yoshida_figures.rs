@@ -95,12 +95,12 @@ fn beam_over_air_above(figure: &Figure, number: i64) -> f64 {
 #[test]
 fn the_air_in_the_beam_of_figure_6a_is_several_times_as_bright_as_above_it() {
     let figure = Figure::whole("yoshida_figure_6a.toml");
-    for (number, stated, tolerance) in [(20, 11.0, 0.5), (60, 4.3, 0.05), (100, 3.6, 0.05)] {
-        let ratio = beam_over_air_above(&figure, number);
-        assert_measured!(format!("beam over the air above it in frame {number}"), ratio, stated, tolerance);
-    }
+    let [first, middle, last] = [20, 60, 100].map(|number| beam_over_air_above(&figure, number));
+    assert_measured!("figure 6a: beam over the air above it in frame 20", first, 11.0, 0.5);
+    assert_measured!("figure 6a: beam over the air above it in frame 60", middle, 4.3, 0.05);
+    assert_measured!("figure 6a: beam over the air above it in frame 100", last, 3.6, 0.05);
     let ratio = beam_over_air_above(&Figure::whole("driving_in_rain.toml"), 60);
-    assert_measured!("beam over the air above it by Bansho's own method", ratio, 90.0, 1.0);
+    assert_measured!("figure 6a: beam over the air above it by Bansho's own method", ratio, 90.0, 1.0);
 }
 
 /// Angle from the vertical, degrees, along which the light of a picture varies least: that of its streaks. To the right at the top is positive.
@@ -128,22 +128,26 @@ fn streaks_of_figure_6b_are_vertical_and_banshos_own_lean() {
     // Verticals meet below the picture, since the camera looks down.
     let upper_right = Some(Rect { x: 400, y: 0, width: 240, height: 160 });
     let lean = |name: &str, crop: Option<Rect>| lean_deg(&Figure::rain_alone(name).draw(60, crop));
-    assert_measured!("lean to the letter, degrees", lean("yoshida_figure_6b.toml", upper_right), 6.0, 0.5);
+    assert_measured!("figure 6b: lean to the letter, degrees", lean("yoshida_figure_6b.toml", upper_right), 6.0, 0.5);
     assert_measured!(
-        "lean by Bansho's own method, degrees",
+        "figure 6b: lean by Bansho's own method, degrees",
         lean("driving_toward_camera.toml", upper_right),
         45.0,
         0.5
     );
     let whole = Figure::rain_alone("yoshida_figure_6b.toml").draw(60, None);
-    assert_measured!("billboards", metadata(&whole, "billboards_in_view"), 885.0, 0.0);
+    assert_measured!("figure 6b: billboards", metadata(&whole, "billboards_in_view"), 885.0, 0.0);
+    let side = Figure::rain_alone("yoshida_figure_6a.toml").draw(60, None);
+    assert_measured!("billboards of figure 6a", metadata(&side, "billboards_in_view"), 904.0, 0.0);
+    // The drops of the textures, not the sum of no streaks, -0.
+    assert_measured!("drops of figure 6a", metadata(&side, "drops_in_view"), 29_263.0, 0.0);
 }
 
 #[test]
 fn the_scene_of_all_rates_has_as_many_billboards_as_its_page_states() {
     let frame = Figure::rain_alone("yoshida_rates.toml").draw(100, None);
-    assert_measured!("rate, mm/h", metadata(&frame, "rain_rate"), 20.0, 0.0);
-    assert_measured!("billboards", metadata(&frame, "billboards_in_view"), 642.0, 0.0);
+    assert_measured!("section 6: setting: rate, mm/h", metadata(&frame, "rain_rate"), 20.0, 0.0);
+    assert_measured!("section 6: setting: billboards", metadata(&frame, "billboards_in_view"), 642.0, 0.0);
 }
 
 /// Mean light of the rain below a lamp, in rings 20 pixels wide at distances of 30, 60 and 170 pixels from it, over four frames: the first two divided by
@@ -176,17 +180,17 @@ fn light_near_the_lamp(name: &str, lamp: DVec3) -> [f64; 2] {
 #[test]
 fn light_of_figure_7a_falls_away_from_the_lamp() {
     let [near, middle] = light_near_the_lamp("yoshida_figure_7a.toml", DVec3::new(0.0, 3.2, 0.0));
-    assert_measured!("30 over 170 pixels to the letter", near, 2.9, 0.05);
+    assert_measured!("figure 7a: 30 over 170 pixels to the letter", near, 2.9, 0.05);
     assert_measured!("60 over 170 pixels to the letter", middle, 3.1, 0.05);
     let [near, _] = light_near_the_lamp("lamp_post_afar.toml", DVec3::new(0.0, 5.33, 0.0));
-    assert_measured!("30 over 170 pixels by Bansho's own method", near, 12.2, 0.05);
+    assert_measured!("figure 7a: 30 over 170 pixels by Bansho's own method", near, 12.2, 0.05);
 }
 
 #[test]
 fn light_of_figure_7b_falls_away_from_the_lamp() {
     let [near, middle] = light_near_the_lamp("yoshida_figure_7b.toml", DVec3::new(0.0, 3.2, 0.0));
-    assert_measured!("30 over 170 pixels to the letter", near, 1.4, 0.05);
+    assert_measured!("figure 7b: 30 over 170 pixels to the letter", near, 1.4, 0.05);
     assert_measured!("60 over 170 pixels to the letter", middle, 2.1, 0.05);
     let [near, _] = light_near_the_lamp("lamp_post_near.toml", DVec3::new(0.0, 5.33, 0.0));
-    assert_measured!("30 over 170 pixels by Bansho's own method", near, 14.0, 0.05);
+    assert_measured!("figure 7b: 30 over 170 pixels by Bansho's own method", near, 14.0, 0.05);
 }

@@ -166,8 +166,8 @@ mod tests {
         let [up, across] = [attenuation.of_level(level), f64::from(attenuation.of_field_line([180.0, 240.0]))];
         assert!((up - 0.990_050).abs() < 1e-6 && (across - 0.913_931).abs() < 1e-6, "{up} {across}");
         // The distance is the hypotenuse, 316 km: exp(-0.1).
-        assert_measured!("distance, km", math::hypot(100.0, math::hypot(180.0, 240.0)), 316.0, 0.5);
-        assert!((up * across - 0.904_837).abs() < 1e-6);
+        assert_measured!("equation (2.27): distance, km", math::hypot(100.0, math::hypot(180.0, 240.0)), 316.0, 0.5);
+        assert_measured!("equation (2.27): attenuation", up * across, 0.904_837, 1e-6);
         assert_eq!(AttenuationByDistance::default().of_level(level), 1.0);
     }
 }

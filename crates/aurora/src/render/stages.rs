@@ -269,6 +269,13 @@ mod tests {
         canvas.line([place, place], 8.0, [1.0; 3]);
         assert_eq!(canvas.pixels[20 * 100 + 75], [1.0; 3]);
         assert_eq!(canvas.pixels[80 * 100 + 75], [0.0; 3]);
+        let lit = (0..100 * 100).filter(|index| canvas.pixels[*index] == [1.0; 3]);
+        let (mut column, mut row, mut count) = (0.0, 0.0, 0.0);
+        for index in lit {
+            (column, row, count) = (column + (index % 100) as f64, row + (index / 100) as f64, count + 1.0);
+        }
+        bansho_base::assert_measured!("figure 2.2: column of a point 50 km east", column / count, 75.0, 0.51);
+        bansho_base::assert_measured!("figure 2.2: row of a point 60 km north", row / count, 20.0, 0.51);
         // Its area is that of a circle of 8 pixels.
         let area: f32 = canvas.pixels.iter().map(|pixel| pixel[1]).sum();
         assert!((f64::from(area) / (std::f64::consts::PI * 16.0) - 1.0).abs() < 0.03, "{area}");

@@ -205,7 +205,10 @@ impl NeighborCells {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::math::random::{Key, Purpose};
+    use bansho_base::{
+        assert_measured,
+        math::random::{Key, Purpose},
+    };
     use bansho_sph::{Cells, PressureForce, compute_densities};
 
     use super::*;
@@ -253,12 +256,14 @@ mod tests {
     }
 
     fn assert_equal(found: &[Vec<f32>; 3], expected: &[Vec<f64>; 3]) {
+        let mut largest = 0.0_f64;
         for (found, expected) in found.iter().zip(expected) {
             let scale = expected.iter().map(|value| value.abs()).fold(0.0, f64::max);
             for (found, expected) in found.iter().zip(expected) {
-                assert!((f64::from(*found) - expected).abs() < 1e-4 * scale, "{found} for {expected}");
+                largest = largest.max((f64::from(*found) - expected).abs() / scale);
             }
         }
+        assert_measured!("equation (2.14) & figure 2.17: difference of sums", largest, 0.0, 1e-4);
     }
 
     #[test]
@@ -289,6 +294,30 @@ mod tests {
         let [of_cells, of_all] =
             [&found[0], &whole].map(|densities| densities.iter().map(|d| f64::from(*d)).sum::<f64>());
         assert!(of_cells < 0.999 * of_all && of_cells > 0.9 * of_all, "{of_cells} of {of_all}");
+    }
+
+    /// The example of the thesis: seven particles in the cells 0 to 3 of figure 2.17.
+    #[test]
+    fn lists_of_cells_are_those_of_tables_2_2_to_2_4() {
+        // Table 2.2: the cell of each particle.
+        const CELL_INDEX: [usize; 7] = [0, 2, 1, 0, 3, 0, 1];
+        let center = |cell: &usize| [0.5 + (cell % 2) as f32, 0.5 + (cell / 2) as f32];
+        let positions = [0, 1].map(|axis| CELL_INDEX.iter().map(|cell| center(cell)[axis]).collect());
+        let mut cells = NeighborCells::new(2.0);
+        cells.assign(&positions, &[1.0; 7], 2.0);
+        // Table 2.3: the particles in the order of their cells.
+        assert_eq!(cells.order, [0, 3, 5, 2, 6, 1, 4]);
+        let sorted_cells: Vec<usize> = cells.order.iter().map(|particle| CELL_INDEX[*particle as usize]).collect();
+        assert_eq!(sorted_cells, [0, 0, 0, 1, 1, 2, 3]);
+        // Table 2.4: the first and the last place of each cell. There is a border of empty cells.
+        assert_eq!(cells.size, [4, 4]);
+        let starts = &cells.starts;
+        let bounds = [0, 1, 2, 3].map(|cell| {
+            let cell = (cell / 2 + 1) * 4 + cell % 2 + 1;
+            [starts[cell], starts[cell + 1] - 1]
+        });
+        assert_eq!(bounds, [[0, 2], [3, 4], [5, 5], [6, 6]]);
+        assert_measured!("table 2.2 & table 2.3 & table 2.4: particles", f64::from(bounds[3][1] + 1), 7.0, 0.0);
     }
 
     #[test]

@@ -89,6 +89,8 @@ fn rounded(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use bansho::base::assert_measured;
+
     use super::*;
 
     #[test]
@@ -98,8 +100,10 @@ mod tests {
             figure.table.rows.iter().find(|row| (row[0] / distance - 1.0).abs() < 1e-6).cloned().unwrap()
         };
         // 9000 cd at 10 m: 90 lx. In 20 mm/h the extinction is 1.20 per km: exp(-0.012) = 0.988; at 1000 m exp(-1.2) = 0.301.
-        assert!((row(10.0)[1] - 90.0).abs() < 1e-3 && (row(10.0)[2] / 90.0 - 0.988).abs() < 2e-4);
-        assert!((row(1000.0)[2] / 0.009 - 0.301).abs() < 3e-3, "{}", row(1000.0)[2]);
+        let [near, far] = [row(10.0)[2] / 90.0, row(1000.0)[2] / 0.009];
+        assert_measured!("section 5.2: light: at 10 m, lx", row(10.0)[1], 90.0, 1e-3);
+        assert_measured!("future work: attenuation: at 10 m", near, 0.988, 2e-4);
+        assert_measured!("future work: attenuation: at 1 km", far, 0.301, 3e-3);
         // Half way between the cosines of the cones the smoothstep is a half.
         let half = math::acos(0.5 * (math::cos(5_f64.to_radians()) + math::cos(22_f64.to_radians()))).to_degrees();
         let nearest =

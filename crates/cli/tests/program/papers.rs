@@ -1,10 +1,14 @@
-//! `bansho check --paper`, with the scenes of the papers.
+//! The pages of the papers: `bansho check --paper` with their scenes, and the commands of their tables.
 
-use crate::support::Folder;
+use std::{collections::BTreeSet, fs};
+
+use crate::support::{Folder, Run};
+
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
 /// The lines that `bansho check --paper` prints of a scene in `scenes`, but for the first.
 fn departures(scene: &str) -> Vec<String> {
-    let path = format!("{}/../../scenes/{scene}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{ROOT}/scenes/{scene}");
     let run = Folder::new().succeed(&["check", "--paper", &path]);
     assert!(run.stdout.lines().next().is_some_and(|line| line.contains(": valid. ")), "{}", run.stdout);
     run.stdout.lines().skip(1).map(|line| line.trim().to_owned()).collect()
@@ -54,4 +58,64 @@ fn departures_of_lists_and_of_the_implied_sky_are_listed() {
         assert!(lines.contains(&format!("  {line}\n")), "{line}\n{lines}");
     }
     assert!(!lines.contains("shapes.1"), "{lines}");
+}
+
+/// The commands `bansho SUBCOMMAND ...` in the tables under the heading `Everything numbered`, without the program's name.
+fn commands(subcommand: &str) -> BTreeSet<String> {
+    let pages = fs::read_dir(format!("{ROOT}/docs/src/papers")).unwrap();
+    let of_page = |page: String| -> Vec<String> {
+        let (_, tables) = page.split_once("## Everything numbered").unwrap();
+        let code =
+            tables.lines().filter(|line| line.starts_with('|')).flat_map(|line| line.split('`').skip(1).step_by(2));
+        code.filter_map(|code| code.strip_prefix("bansho ")).map(str::to_owned).collect()
+    };
+    let commands = pages.flat_map(|page| of_page(fs::read_to_string(page.unwrap().path()).unwrap()));
+    let commands: BTreeSet<String> = commands.filter(|command| command.split(' ').next() == Some(subcommand)).collect();
+    assert!(!commands.is_empty(), "{subcommand}");
+    commands
+}
+
+/// Runs a command of a page with further arguments. Scenes are those of the repository.
+fn succeed(folder: &Folder, command: &str, further: &[&str]) -> Run {
+    let arguments: Vec<String> =
+        command.split(' ').map(|word| word.replace("scenes/", &format!("{ROOT}/scenes/"))).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).chain(further.iter().copied()).collect();
+    folder.succeed(&arguments)
+}
+
+#[test]
+fn figures_and_textures_of_the_papers_are_drawn_by_the_commands_of_their_tables() {
+    let mut written = 0;
+    for command in commands("plot").into_iter().chain(commands("streaks")) {
+        let folder = Folder::new();
+        // Few frames, and not a large picture.
+        let small: &[&str] =
+            if command.starts_with("plot flame-statistics") { &["--frames", "2", "--height", "32"] } else { &[] };
+        succeed(&folder, &command, small);
+        assert!(!folder.names().is_empty(), "`bansho {command}` wrote nothing");
+        written += 1;
+    }
+    assert!(written >= 8, "{written}");
+}
+
+/// The first frame of each, drawn small; the commands draw up to 561 frames.
+#[test]
+fn frames_of_the_papers_are_drawn_by_the_commands_of_their_tables() {
+    let mut with_statistics = 0;
+    for command in commands("render") {
+        let folder = Folder::new();
+        let mut words: Vec<&str> = command.split(' ').collect();
+        if let Some(frames) = words.iter().position(|word| *word == "--frames") {
+            words.drain(frames..frames + 2);
+        }
+        let small = ["--frames", "0-0", "--size", "64x36", "--set", "aurora.particles.count=1000"];
+        let run = succeed(&folder, &words.join(" "), &small);
+        assert_eq!(folder.names().iter().filter(|name| name.ends_with(".png")).count(), 1, "{:?}", folder.names());
+        // Processor time is what the rows of figures 3.9 to 3.13 state.
+        if words.contains(&"--stats") {
+            with_statistics += 1;
+            assert!(run.stderr.contains("draw") && run.stderr.contains("threads"), "{}", run.stderr);
+        }
+    }
+    assert_eq!(with_statistics, 5, "scenes 1 to 5");
 }

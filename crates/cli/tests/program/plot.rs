@@ -2,6 +2,8 @@
 
 use std::{collections::HashSet, fs};
 
+use bansho::base::assert_measured;
+
 use crate::support::{FLAME, Folder, decode_png};
 
 /// Columns and rows of a figure's table; empty cells are NaN.
@@ -76,6 +78,7 @@ fn black_bodies_are_a_texture_with_a_texel_for_each_row() {
     assert_eq!((linear.0, linear.1, linear.2.len()), (96, 1, table.rows.len()));
     assert_eq!((srgb.0, srgb.1), (96, 1));
     let mut colored = 0;
+    let mut largest = 0.0_f64;
     for ((row, linear), srgb) in table.rows.iter().zip(&linear.2).zip(&srgb.2) {
         let brightest = row[1..4].iter().fold(0.0, |a: f64, b| a.max(*b));
         for c in 0..3 {
@@ -87,10 +90,11 @@ fn black_bodies_are_a_texture_with_a_texel_for_each_row() {
             } else {
                 1.055 * bansho::base::math::pow(value, 1.0 / 2.4) - 0.055
             };
-            assert!((f64::from(srgb[c]) - 255.0 * encoded).abs() < 0.6, "{row:?}: {srgb:?}");
+            largest = largest.max((f64::from(srgb[c]) - 255.0 * encoded).abs());
             colored += usize::from(linear[c] == 65_535);
         }
     }
+    assert_measured!("figure 1: difference from the table, codes", largest, 0.0, 0.6);
     // 600 K has 2e-7 cd/m^2; from 700 K on each color has one full channel.
     assert_eq!((linear.2[1], colored), ([0; 3], 94));
 }
@@ -99,12 +103,13 @@ fn black_bodies_are_a_texture_with_a_texel_for_each_row() {
 fn poly6_is_normalized_and_its_textures_are_figures_2_and_3() {
     let table = Csv::of(&["kernel"]);
     // 315/(64 pi), and 9/(2 pi) through the center.
-    assert!(near(table.row(0.0)[1], 1.566_681, 1e-6) && near(table.row(0.0)[3], 1.432_394, 1e-6));
+    assert_measured!("equation (2): W(0) d^3", table.row(0.0)[1], 1.566_681, 2e-6);
+    assert_measured!("equation (6): line integral through the center", table.row(0.0)[3], 1.432_394, 2e-6);
     let shell = |row: &Vec<f64>| 4.0 * std::f64::consts::PI * row[0] * row[0] * row[1] / 200.0;
     let mass: f64 = table.rows.iter().map(shell).sum();
-    assert!((mass - 1.0).abs() < 1e-4, "{mass}");
+    assert_measured!("equation (2) & equation (4) & equation (5): integral over space", mass, 1.0, 1e-4);
     // W' = -6 * 315/(64 pi) * r (1 - r^2)^2 at 0.5.
-    assert!(near(table.row(0.5)[2], -2.643_774, 1e-6));
+    assert_measured!("equation (7): W' d^4 at d/2", table.row(0.5)[2], -2.643_774, 3e-6);
     let (width, height, density) = texture(&["kernel", "--texture", "density", "--size", "33"]);
     assert_eq!((width, height), (33, 33));
     let (_, _, deflection) = texture(&["kernel", "--texture", "deflection", "--size", "33"]);
@@ -113,6 +118,8 @@ fn poly6_is_normalized_and_its_textures_are_figures_2_and_3() {
     let s: f64 = 1.0 - x * x - y * y;
     let at = |column: usize, row: usize| row * 33 + column;
     assert_eq!((density[at(16, 16)], density[at(0, 16)], density[at(0, 0)]), ([255; 3], [0; 3], [0; 3]));
+    assert_measured!("figure 2: code of the center", f64::from(density[at(16, 16)][0]), 255.0, 0.0);
+    assert_measured!("figure 3: code of the center", f64::from(deflection[at(16, 16)][0]), 128.0, 0.0);
     assert_eq!(density[at(24, 11)], [(255.0 * s * s * s).round() as u32; 3]);
     // The largest gradient is 16/25 sqrt(1/5).
     let toward = |offset: f64| (127.5 + 127.5 * offset * s * s / (0.64 * 0.2_f64.sqrt())).round() as u32;
@@ -291,38 +298,39 @@ fn the_shape_of_a_flame_is_that_of_the_scene() {
 fn the_curves_of_picture_5_are_those_that_its_page_states() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/papers/ohshima_itahashi/ohshima_picture_5.toml");
     let curves = Csv::of(&["transfer-curves", scene]);
-    bansho::base::assert_measured!("argument at which C is largest", curves.peak(1), 0.72, 0.005);
-    bansho::base::assert_measured!("largest C", curves.row(curves.peak(1))[1], 1.0, 0.005);
-    bansho::base::assert_measured!("C(1)", curves.row(1.0)[1], 0.88, 0.005);
-    for (s, stated) in [(0.5, [1.0, 0.56, 0.06]), (1.0, [1.0, 0.96, 0.74])] {
-        for (name, found, stated) in [("R", 2, stated[0]), ("G", 3, stated[1]), ("B", 4, stated[2])] {
-            bansho::base::assert_measured!(format!("{name}({s})"), curves.row(s)[found], stated, 0.005);
-        }
-    }
+    assert_measured!("figure 3: argument at which C is largest", curves.peak(1), 0.72, 0.005);
+    assert_measured!("figure 3: largest C", curves.row(curves.peak(1))[1], 1.0, 0.005);
+    assert_measured!("figure 3: C(1)", curves.row(1.0)[1], 0.88, 0.005);
+    let [[r, g, b], [last_r, last_g, last_b]] = [0.5, 1.0].map(|s| [2, 3, 4].map(|column| curves.row(s)[column]));
+    assert_measured!("figure 4: R(0.5)", r, 1.0, 0.005);
+    assert_measured!("figure 4: G(0.5)", g, 0.56, 0.005);
+    assert_measured!("figure 4: B(0.5)", b, 0.06, 0.005);
+    assert_measured!("figure 4: R(1)", last_r, 1.0, 0.005);
+    assert_measured!("figure 4: G(1)", last_g, 0.96, 0.005);
+    assert_measured!("figure 4: B(1)", last_b, 0.74, 0.005);
     // Rows are 1/256 apart.
     let shape = Csv::of(&["flame-shape", scene, "--height", "0.5"]);
     let last = |is_before: &dyn Fn(&Vec<f64>) -> bool| shape.rows.iter().rfind(|row| is_before(row)).unwrap()[0];
-    bansho::base::assert_measured!("w up to which V is 0", last(&|row| row[1] == 0.0), 0.26, 0.005);
-    bansho::base::assert_measured!("V(1)", shape.row(1.0)[1], 1.0, 1e-6);
-    for (u, stated) in [(0.0, 1.0), (0.5, 0.0), (1.0, 1.0)] {
-        bansho::base::assert_measured!(format!("H({u})"), shape.row(u)[2], stated, 1e-6);
-    }
-    bansho::base::assert_measured!("x' up to which K is 1, at w = 0.5", last(&|row| row[7] == 1.0), 0.40, 0.005);
-    bansho::base::assert_measured!(
-        "x' up to which K is above h, at w = 0.5",
-        last(&|row| row[7] > 0.72 + 1e-6),
-        0.76,
-        0.005
-    );
-    bansho::base::assert_measured!("h", shape.row(1.0)[7], 0.72, 1e-6);
+    assert_measured!("figure 2: w up to which V is 0", last(&|row| row[1] == 0.0), 0.26, 0.005);
+    assert_measured!("figure 2: V(1)", shape.row(1.0)[1], 1.0, 1e-6);
+    assert_measured!("figure 2: H on the axis", shape.row(0.5)[2], 0.0, 1e-6);
+    assert_measured!("figure 2: H at the left edge", shape.row(0.0)[2], 1.0, 1e-6);
+    assert_measured!("figure 2: H at the right edge", shape.row(1.0)[2], 1.0, 1e-6);
+    assert_measured!("figure 6: x' up to which K is 1", last(&|row| row[7] == 1.0), 0.40, 0.005);
+    assert_measured!("figure 6: x' up to which K is above h", last(&|row| row[7] > 0.72 + 1e-6), 0.76, 0.005);
+    assert_measured!("figure 6: h", shape.row(1.0)[7], 0.72, 1e-6);
     // P of (15) at both edges.
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
     for row in &shape.rows {
         let fringe = row[5] - row[4];
         for edge in [row[8], row[9]].into_iter().filter(|_| fringe > 1e-3) {
             let p = (edge - row[4]) / fringe;
             assert!((0.2 - 1e-3..=1.0 + 1e-3).contains(&p), "{p} at {}", row[0]);
+            (least, most) = (least.min(p), most.max(p));
         }
     }
+    assert_measured!("figure 7: least P", least, 0.2, 1e-3);
+    assert_measured!("figure 7: largest P", most, 1.0, 1e-3);
 }
 
 #[test]

@@ -74,11 +74,15 @@ pub fn above_threshold<N: Real>(texture: N, threshold: N) -> N {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::assert_measured;
+
     use super::*;
 
     #[test]
     fn rise_9_is_the_root_for_k_0_and_the_line_for_k_1() {
         assert_eq!((rise(0.25, 0.0), rise(0.25, 1.0), rise(0.25, 0.4)), (0.5, 0.25, 0.4));
+        assert_measured!("equation (9): w at y = 0.25 for k = 0", f64::from(rise(0.25, 0.0)), 0.5, 0.0);
+        assert_measured!("equation (9): w at y = 0.25 for k = 0.4", f64::from(rise(0.25, 0.4)), 0.4, 1e-7);
         assert_eq!((rise(0.0, 0.3), rise(1.0, 0.3)), (0.0, 1.0));
     }
 
@@ -99,15 +103,14 @@ mod tests {
         let accelerations = [0.0, 0.25, 0.5, 0.75, 1.0].map(|k| (speed(k, 0.95) - speed(k, 0.05)) / 0.9);
         assert!(starts.windows(2).all(|pair| pair[0] + 0.005 < pair[1]), "{starts:?}");
         assert!(accelerations.windows(2).all(|pair| pair[0] > pair[1] + 0.005), "{accelerations:?}");
-        assert!(
-            (starts[0] - 0.1).abs() < 1e-3 && (accelerations[0] - 2.0).abs() < 1e-2,
-            "{starts:?} {accelerations:?}"
-        );
+        assert_measured!("table 1: initial speed for k = 0", starts[0], 0.1, 1e-3);
+        assert_measured!("table 1: acceleration for k = 0", accelerations[0], 2.0, 1e-2);
     }
 
     #[test]
     fn axis_distance_10_is_0_on_the_axis_and_1_at_both_edges() {
         assert_eq!([0.0, 0.25, 0.5, 0.875, 1.0].map(axis_distance), [1.0, 0.5, 0.0, 0.75, 1.0]);
+        assert_measured!("equation (10): x' at x = 0.875", f64::from(axis_distance(0.875)), 0.75, 0.0);
     }
 
     #[test]
@@ -116,6 +119,7 @@ mod tests {
         let speed = |distance| speed_profile(1.0 - fringe_position(distance, 0.5, 0.25), 0.2);
         assert_eq!((speed(0.3), speed(0.5)), (1.0, 1.0));
         assert!((speed(0.625) - 0.6).abs() < 1e-6);
+        assert_measured!("equation (11): K in the middle of the fringe", f64::from(speed(0.625)), 0.6, 1e-6);
         assert!((speed(0.75) - 0.2).abs() < 1e-6 && (speed(1.0) - 0.2).abs() < 1e-6);
     }
 
@@ -127,11 +131,13 @@ mod tests {
     #[test]
     fn slowed_rise_12_leaves_the_flame_where_the_edge_is_too_slow() {
         assert_eq!((slowed_rise(0.4, 1.0), slowed_rise(0.4, 0.5), slowed_rise(0.4, 0.25)), (0.4, 0.8, 1.6));
+        assert_measured!("equation (12): w / K at half speed", f64::from(slowed_rise(0.4, 0.5)), 0.8, 1e-7);
     }
 
     #[test]
     fn fluttering_edge_15_swings_within_the_fringe() {
         assert_eq!([0.0, 0.5, 1.0].map(|flutter| fluttering_edge(0.5, 0.25, flutter)), [0.5, 0.625, 0.75]);
+        assert_measured!("equation (15): E for P = 0.5", f64::from(fluttering_edge(0.5, 0.25, 0.5)), 0.625, 0.0);
     }
 
     #[test]
@@ -139,12 +145,18 @@ mod tests {
         // E = 3/4 on both sides: x = 7/8 is the right edge, x = 1/8 the left one.
         let u = |x| texture_u(across(axis_distance(x), 0.75), x);
         assert_eq!([0.125, 0.3125, 0.5, 0.6875, 0.875].map(u), [0.0, 0.25, 0.5, 0.75, 1.0]);
+        assert_measured!("equation (13): u at the right edge", f64::from(u(0.875)), 1.0, 0.0);
+        assert_measured!("equation (14): u at half the right edge", f64::from(u(0.6875)), 0.75, 0.0);
+        assert_measured!("equation (17): u at the left edge", f64::from(u(0.125)), 0.0, 0.0);
+        assert_measured!("equation (18): u at half the left edge", f64::from(u(0.3125)), 0.25, 0.0);
         assert!(across(axis_distance(0.95), 0.75) > 1.0);
     }
 
     #[test]
     fn threshold_4_joins_both_ways_and_5_cuts_what_is_below() {
         assert_eq!((threshold(0.5, 0.5), threshold(0.0, 0.25), threshold(1.0, 0.0)), (0.75, 0.25, 1.0));
+        assert_measured!("equation (4): L at V = H = 0.5", f64::from(threshold(0.5, 0.5)), 0.75, 0.0);
+        assert_measured!("equation (5): 0.875 above 0.75", f64::from(above_threshold(0.875, 0.75)), 0.125, 0.0);
         assert_eq!((above_threshold(0.875, 0.75), above_threshold(0.5, 0.75)), (0.125, 0.0));
     }
 }

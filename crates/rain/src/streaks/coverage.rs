@@ -131,9 +131,12 @@ fn disc_integral(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::assert_measured;
+
     use super::*;
     use crate::{
         VelocityLaw,
+        billboards::texture::StreakCube,
         drops::terminal_velocity::TerminalVelocity,
         tests::reference::{fields, near},
     };
@@ -173,11 +176,22 @@ mod tests {
             // Averaged across the streak, a disc is pi/4 of its width.
             let factor = OpacityLaw::Paper.factor(diameter, speed, 1.0 / 30.0);
             assert!(near(factor, 2000.0 / 30.0 * 4.0 / PI, 1e-9), "{diameter} mm: {factor}");
-            bansho_base::assert_measured!("opacity over the fraction of 1/30 s", ratio, 66.7, 0.05);
+            assert_measured!("section 4: opacity: over the fraction of 1/30 s", ratio, 66.7, 0.05);
         }
         let law = TerminalVelocity { law: VelocityLaw::RigidSphere, ..TerminalVelocity::default() };
-        let speed = law.speed(1.0);
-        bansho_base::assert_measured!("opacity at 1 mm by the rigid sphere", paper_opacity(1.0, speed), 0.516, 5e-4);
+        let [thin, thick] = [1.0, 2.0].map(|diameter| paper_opacity(diameter, law.speed(diameter)));
+        assert_measured!("section 4: opacity: at 1 mm by the rigid sphere", thin, 0.516, 5e-4);
+        assert_measured!("opacity at 2 mm by the rigid sphere", thick, 0.61, 0.005);
+        // Summed over the width of the streak: a line of the paper is a pixel of the texture wide, whatever D.
+        let pixel = StreakCube::default().pixel();
+        let summed = |diameter: f64| {
+            let speed = law.speed(diameter);
+            let physical = Streak::new(diameter, speed, 1.0 / 30.0).mean_opacity() * 1e-3 * diameter;
+            paper_opacity(diameter, speed) * pixel / physical
+        };
+        assert_measured!("width of a line, mm", 1e3 * pixel, 1.95, 0.005);
+        assert_measured!("opacity summed over the width, of a physical streak of 1 mm", summed(1.0), 166.0, 0.5);
+        assert_measured!("opacity summed over the width, of a physical streak of 2 mm", summed(2.0), 83.0, 0.5);
         // A fast exposure changes the fraction, not the paper's number.
         assert!(near(OpacityLaw::Paper.factor(1.0, 4.03, 1e-3), 2.0 * 4.0 / PI, 1e-9));
         assert_eq!((paper_opacity(3.0, 1.0), OpacityLaw::ExposureFraction.factor(1.0, 4.03, 0.01)), (1.0, 1.0));

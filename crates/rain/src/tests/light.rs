@@ -53,7 +53,7 @@ fn along_a_beam_light_falls_with_the_square_of_the_distance() {
     let (x, y) = (mean(0), mean(1));
     let covariance: f64 = samples.iter().map(|sample| (sample[0] - x) * (sample[1] - y)).sum();
     let exponent = -covariance / samples.iter().map(|sample| (sample[0] - x) * (sample[0] - x)).sum::<f64>();
-    assert!((exponent - 2.0).abs() < 0.05, "{exponent}");
+    bansho_base::assert_measured!("section 5.2: light: exponent", exponent, 2.0, 0.005);
 }
 
 #[test]

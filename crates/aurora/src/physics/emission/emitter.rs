@@ -267,13 +267,13 @@ mod tests {
         // 3.24097 x 0.5739 - 1.53738 x 0.9993 - 0.498612 x 0.0018 = 0.322793; -0.556247 + 1.874647 + 0.000075 = 1.318475;
         // 0.031926 - 0.203833 + 0.001903 = -0.170005. Times 683.
         let [r, g, b] = table_2_1_srgb(557.7, 1.0);
-        assert!((r / 683.0 - 0.322793).abs() < 1e-5 && (g / 683.0 - 1.318475).abs() < 1e-5, "{r} {g}");
-        assert!((b / 683.0 + 0.170005).abs() < 1e-5, "{b}");
+        bansho_base::assert_measured!("equation (2.29): red of 557.7 nm over 683", r / 683.0, 0.322793, 1e-5);
+        bansho_base::assert_measured!("equation (2.29): green of 557.7 nm over 683", g / 683.0, 1.318475, 1e-5);
+        bansho_base::assert_measured!("equation (2.29): blue of 557.7 nm over 683", b / 683.0, -0.170005, 1e-5);
         // 427.8 nm: 0.886729 - 0.045968 - 0.721143 = 0.119619; -0.265184 + 0.056091 + 0.060102 = -0.148991; 0.015220 - 0.006099 + 1.528696 = 1.537817.
         let [r, g, b] = table_2_1_srgb(427.8, 2.0).map(|value| value / (2.0 * 683.0));
-        assert!(
-            (r - 0.119619).abs() < 1e-5 && (g + 0.148991).abs() < 1e-5 && (b - 1.537817).abs() < 1e-5,
-            "{r} {g} {b}"
-        );
+        bansho_base::assert_measured!("equation (2.30): red of 427.8 nm over 683", r, 0.119619, 1e-5);
+        bansho_base::assert_measured!("equation (2.30): green of 427.8 nm over 683", g, -0.148991, 1e-5);
+        bansho_base::assert_measured!("equation (2.30): blue of 427.8 nm over 683", b, 1.537817, 1e-5);
     }
 }

@@ -270,7 +270,12 @@ mod tests {
     #[test]
     fn thermal_speed_by_hand() {
         // sqrt(8 x 1.380649e-23 x 300 / (pi x 28.014 x 1.660539e-27)) = 476.2 m/s.
-        assert!((thermal_speed(300.0, 28.014) - 476.2).abs() < 0.1);
+        bansho_base::assert_measured!(
+            "equation (2.26): speed of nitrogen at 300 K, m/s",
+            thermal_speed(300.0, 28.014),
+            476.2,
+            0.1
+        );
     }
 
     #[test]
@@ -291,6 +296,14 @@ mod tests {
             assert!((found[0] - of_collisions).abs() < 0.006, "{altitude_km}: {found:?}");
             assert!((found[1] - of_molecules).abs() < 0.006, "{altitude_km}: {found:?}");
         }
+        bansho_base::assert_measured!("equation (2.25): left at 115 km with 32 pm", left(115.0, 32e-12), 0.16, 0.006);
+        bansho_base::assert_measured!("equation (2.25): left at 120 km with 32 pm", left(120.0, 32e-12), 0.35, 0.006);
+        bansho_base::assert_measured!("equation (2.25): left at 130 km with 32 pm", left(130.0, 32e-12), 0.64, 0.006);
+        bansho_base::assert_measured!("equation (2.25): left at 150 km with 32 pm", left(150.0, 32e-12), 0.87, 0.006);
+        bansho_base::assert_measured!("equation (2.25): left at 130 km with 185 pm", left(130.0, 185e-12), 0.0, 0.006);
+        bansho_base::assert_measured!("equation (2.25): left at 150 km with 185 pm", left(150.0, 185e-12), 0.01, 0.006);
+        bansho_base::assert_measured!("equation (2.25): left at 170 km with 185 pm", left(170.0, 185e-12), 0.12, 0.006);
+        bansho_base::assert_measured!("equation (2.25): left at 190 km with 185 pm", left(190.0, 185e-12), 0.33, 0.006);
         assert!(hard_sphere_quenching(SpectralEmitter::NitrogenIon, &atmosphere().at(110.0), 1.85e-10) < 1e-3);
     }
 

@@ -271,8 +271,18 @@ mod tests {
         });
         let (sum, squares) = counts.fold((0.0, 0.0), |(sum, squares), count| (sum + count, squares + count * count));
         let (mean, variance) = (sum / 4000.0, squares / 4000.0 - sum * sum / 16e6);
-        assert!((mean / expected - 1.0).abs() < 0.05, "{mean} for {expected}");
-        assert!((variance / expected - 1.0).abs() < 0.1, "{variance} for {expected}");
+        bansho_base::assert_measured!(
+            "equation (2.22): difference of the mean count",
+            mean / expected - 1.0,
+            0.0,
+            0.05
+        );
+        bansho_base::assert_measured!(
+            "equation (2.21): difference of the variance of counts",
+            variance / expected - 1.0,
+            0.0,
+            0.1
+        );
     }
 
     /// Altitudes of the collisions of an electron, km, from the highest down, by the steps of (2.21) with the probability (2.22) as printed. Steps are short:

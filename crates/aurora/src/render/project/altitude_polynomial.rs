@@ -251,6 +251,7 @@ mod tests {
         // A row is 1.5 mrad high, a pixel of an ordinary picture.
         let projection = ChartProjection::of_rows(1.5e-3);
         let descents = RowPolynomialBasis::new();
+        let mut largest = 0.0_f32;
         for dip_deg in [90.0, 77.0, 60.0] {
             let field = FieldLines::new(dip_deg, 0.0, DVec3::ZERO);
             for (longitude, distance) in [(0.3, 15.0), (1.6, 60.0), (-1.5, 150.0), (-1.6, 400.0), (-1.2, 900.0)] {
@@ -269,7 +270,7 @@ mod tests {
                     });
                     for i in 0..LANES {
                         let what = || format!("dip {dip_deg}, {distance} km away, {} km high", altitudes_km[i]);
-                        assert!((rows[i] - exact_rows[i]).abs() < 0.3, "{}: {} {}", what(), rows[i], exact_rows[i]);
+                        largest = largest.max((rows[i] - exact_rows[i]).abs());
                         // Brightness does not follow the offset.
                         let ratio = brightness[i] / exact_lights[i];
                         assert!((ratio - 1.0).abs() < 0.025, "{}: {ratio}", what());
@@ -277,5 +278,6 @@ mod tests {
                 }
             }
         }
+        bansho_base::assert_measured!("figure 2.16: difference, rows", f64::from(largest), 0.0, 0.3);
     }
 }

@@ -380,6 +380,8 @@ mod tests {
         assert_eq!(transition.strands, [vec![0, 1, 4], vec![5, 2, 3]]);
         assert_eq!(transition.chains.len(), 2);
         assert_eq!((transition.splits[0].new, transition.splits[0].old), ([4, 5], [1, 2]));
+        let new_points = tracks.len() as f64 - 4.0;
+        bansho_base::assert_measured!("figure 2.4: new points", new_points, 2.0, 0.0);
         assert!([4, 5].iter().all(|&new| tracks[new].knot(0).position == DVec2::new(1.5, 0.0)));
     }
 
@@ -400,6 +402,8 @@ mod tests {
     fn merged_ends_take_a_point_each() {
         let (transition, tracks) = transition(&merge(&[([1, 2], Auto::Set([1.0, 1.0]))]), 2).unwrap();
         assert_eq!(transition.strands, [vec![0, 1, 2, 3, 8], vec![4, 5, 6, 7, 9]]);
+        let new_points = transition.strands[0].iter().filter(|point| **point >= 8).count();
+        bansho_base::assert_measured!("figure 2.5: new points of an end", new_points as f64, 1.0, 0.0);
         let links = [ChainLink { strand: 0, reversed: false }, ChainLink { strand: 1, reversed: true }];
         assert_eq!(transition.chains, [links]);
         assert_eq!(transition.tracks_along(links[1]), [9, 7, 6, 5, 4]);

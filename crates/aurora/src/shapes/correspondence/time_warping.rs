@@ -144,6 +144,12 @@ mod tests {
         let mean: f64 = (0..31).map(moved).sum::<f64>() / 31.0;
         let by_length: f64 = points.iter().map(|point| point.x * 0.5).sum::<f64>() / 31.0;
         assert!(mean < 0.75 * by_length, "{mean} {by_length}");
+        bansho_base::assert_measured!(
+            "future work: correspondence: way of points, of that at equal fractions, %",
+            100.0 * mean / by_length,
+            26.0,
+            0.5
+        );
         assert!(fractions.windows(2).all(|pair| pair[1] > pair[0]));
     }
 

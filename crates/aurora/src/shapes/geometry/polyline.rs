@@ -183,7 +183,8 @@ mod tests {
         }
         let stroke: Vec<DVec2> = (0..320).map(|i| DVec2::new(f64::from(i), 0.0)).collect();
         // Counted from 1.
-        assert_eq!(resample_by_printed_index(&stroke, 32)[31].x + 1.0, 311.0);
+        let last_point = resample_by_printed_index(&stroke, 32)[31].x + 1.0;
+        bansho_base::assert_measured!("equation (2.1): last recorded point as printed", last_point, 311.0, 0.0);
         assert_eq!(resample_by_index(&stroke, 32)[31].x, 319.0);
     }
 

@@ -187,7 +187,8 @@ mod tests {
     fn gradient_of_a_plane_is_its_slope() {
         let gradient = plane().gradient();
         let [x, z] = gradient.sample([2.4, -1.0]);
-        assert!((x - 2.0).abs() < 1e-12 && (z + 3.0).abs() < 1e-12, "{x} {z}");
+        bansho_base::assert_measured!("equation (2.8): difference of the slope in x", x - 2.0, 0.0, 1e-12);
+        bansho_base::assert_measured!("equation (2.9): difference of the slope in z", z + 3.0, 0.0, 1e-12);
         // By hand: between the ghost cell (0) and the second cell (2 * 1.75 + 3 * 1.75 + 5 = 13.75) over one unit.
         assert!((gradient.values()[0][0] - 13.75).abs() < 1e-12);
         assert_eq!(gradient.sample([-9.0, -9.0]), gradient.values()[0]);

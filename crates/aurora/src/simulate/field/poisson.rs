@@ -288,15 +288,16 @@ mod tests {
 
     #[test]
     fn the_equation_holds_to_rounding() {
+        let mut largest = 0.0_f64;
         for size in [[255, 255], [256, 256], [256, 100], [31, 64], [1, 1], [2, 7], [7, 1], [130, 33]] {
             for screening in [0.0, 2.5] {
                 let source = charges(size, 0.3);
                 let mut potential = source.clone();
                 PoissonSolver::new(size, 0.3, screening).solve(&mut potential);
-                let left = relative_residual(&potential, &source, screening);
-                assert!(left < 1e-10, "{size:?}, screening {screening}: {left}");
+                largest = largest.max(relative_residual(&potential, &source, screening));
             }
         }
+        bansho_base::assert_measured!("equation (2.4) & equation (2.5): residual", largest, 0.0, 1e-10);
     }
 
     #[test]

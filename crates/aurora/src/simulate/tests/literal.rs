@@ -110,10 +110,15 @@ fn the_spline_makes_rays_where_poly6_and_spiky_do_not() {
     let spline_in_cells = mean_contrast(RepulsionKernel::CubicSpline, NeighborSearch::ThreeByThreeCells, 2);
     assert!(spline > 2.0 * poly6_spiky, "{spline} {poly6_spiky}");
     assert!(spline_in_cells > 2.0 * poly6_spiky, "{spline_in_cells} {poly6_spiky}");
-    assert_measured!("contrast with the spline", spline, 0.245, 0.0005);
-    assert_measured!("contrast with poly6 and spiky", poly6_spiky, 0.085, 0.0005);
-    assert_measured!("contrast of the spline in 3 x 3 cells", spline_in_cells, 0.261, 0.0005);
-    assert_measured!("spline over poly6 and spiky", spline / poly6_spiky, 2.9, 0.05);
+    assert_measured!("figure 2.13 & section 2.5.1: contrast with the spline", spline, 0.245, 0.0005);
+    assert_measured!("figure 2.13: contrast with poly6 and spiky", poly6_spiky, 0.085, 0.0005);
+    assert_measured!(
+        "figure 2.13 & section 2.5.1: contrast of the spline in 3 x 3 cells",
+        spline_in_cells,
+        0.261,
+        0.0005
+    );
+    assert_measured!("figure 2.13: spline over poly6 and spiky", spline / poly6_spiky, 2.9, 0.05);
 }
 
 /// A sheet 240 km long and two cells of 10 km wide, whose particles have neighbors within two cells.
@@ -157,7 +162,7 @@ fn common_acceleration(repulsion_force: RepulsionForce) -> f64 {
 fn the_force_as_printed_lets_particles_drift_together() {
     let [both, printed] = [RepulsionForce::BothDensities, RepulsionForce::AsPrinted].map(common_acceleration);
     assert!(both < 1e-5 && printed > 100.0 * both.max(1e-6), "{both} {printed}");
-    assert_measured!("common acceleration of the force as printed", printed, 0.006, 0.0005);
+    assert_measured!("equation (2.14): common acceleration of the force as printed", printed, 0.006, 0.0005);
     assert_measured!("common acceleration with both densities", both, 3e-9, 3e-9);
 }
 
@@ -182,8 +187,8 @@ fn gauss_seidel_of_the_literal_scenes_leaves_little_of_the_charge() {
     };
     let [few, literal] = [20, 60].map(residual);
     assert!(literal < 0.01 && few > literal, "{few} {literal}");
-    assert_measured!("change by the 61st sweep, % of the depth", 100.0 * literal, 0.89, 0.005);
-    assert_measured!("change by the 21st sweep, % of the depth", 100.0 * few, 2.8, 0.05);
+    assert_measured!("equation (2.6): change by the 61st sweep, % of the depth", 100.0 * literal, 0.89, 0.005);
+    assert_measured!("equation (2.6): change by the 21st sweep, % of the depth", 100.0 * few, 2.8, 0.05);
 }
 
 /// Table 3.3 on a still sheet: every near cell with fewer than 50 particles gets what it lacks, at most 10.
@@ -202,7 +207,7 @@ fn births_are_those_that_table_3_3_predicts() {
     simulation.step();
     let found = simulation.particles().len() - before;
     assert_eq!(found as f64, predicted);
-    assert_measured!("births", predicted, 523.0, 0.0);
+    assert_measured!("table 3.3: births", predicted, 523.0, 0.0);
 }
 
 /// Figure 2.14: without relocation no particle appears or disappears.
@@ -241,7 +246,7 @@ fn an_equal_share_holds_the_light_when_particles_are_born_and_die() {
     let (growth, equal) = drawn(PowerDistribution::Equal);
     let (_, share) = drawn(PowerDistribution::EqualShare);
     assert!((growth - 1.0).abs() > 0.05 && (equal / growth - 1.0).abs() < 0.02, "{growth} {equal}");
-    assert!((share - 1.0).abs() < 0.01, "{share}");
+    assert_measured!("section 2.4.2: equal particles: change of the total", share - 1.0, 0.0, 0.01);
 }
 
 #[test]

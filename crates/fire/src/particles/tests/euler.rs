@@ -98,7 +98,7 @@ fn reference_step(simulation: &Simulation, particles: &[Particle]) -> Vec<[[f64;
 fn a_step_is_the_papers_equations_summed_over_all_pairs() {
     let mut simulation = simulation(&paper());
     let mut before: Vec<Particle> = Vec::new();
-    let (mut compared, mut moved) = (0, 0.0_f64);
+    let (mut compared, mut moved, mut largest) = (0, 0.0_f64, 0.0_f64);
     world().run(&mut simulation, 0.2, |simulation, t| {
         let after = all(simulation);
         if t > 0.0 {
@@ -119,7 +119,7 @@ fn a_step_is_the_papers_equations_summed_over_all_pairs() {
                         f64::from(particle.position[c]) - position[c],
                         STEP * (f64::from(particle.velocity[c]) - velocity[c]),
                     ];
-                    assert!(off.iter().all(|off| off.abs() < 2e-6), "{off:?} m at {t} s");
+                    largest = off.iter().fold(largest, |largest, off| largest.max(off.abs()));
                 }
                 moved = moved.max(f64::from(particle.velocity[0]).abs());
                 compared += 1;
@@ -129,16 +129,23 @@ fn a_step_is_the_papers_equations_summed_over_all_pairs() {
     });
     // Twelve steps of 400; pressure and wind do something.
     assert!(compared == 12 * 400 && moved > 0.1, "{compared} {moved}");
+    bansho_base::assert_measured!(
+        "equation (1) & equation (3) & equation (11) & equation (12) & section 4.3, step 2 & section 4.3, step 3: difference, m",
+        largest,
+        0.0,
+        2e-6
+    );
 }
 
 #[test]
 fn the_same_number_is_added_in_each_step_and_the_oldest_are_removed() {
     let mut simulation = simulation(&paper());
-    let mut newest = 0;
+    let (mut newest, mut added, mut alive) = (0, 0.0, 0.0);
     let speed = simulation.constants().burners[0].speed as f32;
     World::default().run(&mut simulation, 1.0, |simulation, t| {
         let particles = all(simulation);
         let (first, last) = (particles[0].id, particles[particles.len() - 1].id);
+        (added, alive) = ((last + 1 - newest) as f64, particles.len() as f64);
         assert_eq!(last + 1 - newest, 10, "at {t} s");
         newest = last + 1;
         // None is missing between the oldest and the newest.
@@ -154,6 +161,8 @@ fn the_same_number_is_added_in_each_step_and_the_oldest_are_removed() {
         assert!(new.clone().all(|particle| (particle.velocity[1] - speed).abs() < 0.3 * speed));
     });
     assert!(newest > 1000);
+    bansho_base::assert_measured!("section 4.3, step 1: added", added, 10.0, 0.0);
+    bansho_base::assert_measured!("section 4.3, step 1: alive", alive, 400.0, 0.0);
 }
 
 #[test]
@@ -172,7 +181,8 @@ fn the_wind_is_a_force_per_volume_and_is_divided_by_the_density() {
             f64::from(simulation.constants().mass) * 315.0 / (64.0 * std::f64::consts::PI * math::pow(d, 3.0));
         for c in [0, 2] {
             let expected = WIND[c] / density * STEP;
-            assert!((f64::from(particle.velocity[c]) / expected - 1.0).abs() < 1e-5, "{particle:?}");
+            let difference = f64::from(particle.velocity[c]) / expected - 1.0;
+            bansho_base::assert_measured!("equation (8) & section 4.3, step 4: difference", difference, 0.0, 1e-5);
         }
         checked += 1;
     });

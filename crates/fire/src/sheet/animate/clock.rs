@@ -61,6 +61,7 @@ mod tests {
     fn scroll_is_the_integral_of_speed_and_starts_again_with_the_loop() {
         let free = Clock::new(Animated::from(1.5), None);
         assert_eq!((free.scroll(2.0), free.scroll(600.0), free.frequency(0.7)), (3.0, 900.0, 0.7));
+        bansho_base::assert_measured!("equation (1): scroll after 2 s, heights", free.scroll(2.0), 3.0, 0.0);
         let looped = Clock::new(Animated::from(1.5), Some(4.0));
         assert_eq!((looped.scroll(1.0), looped.scroll(5.0), looped.scroll(-3.0)), (1.5, 1.5, 1.5));
     }

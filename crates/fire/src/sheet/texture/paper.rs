@@ -178,6 +178,7 @@ mod tests {
     fn texture_20_has_hand_worked_values() {
         // At the origin every phase is 0: cos 0 cos 0 + 1 = 2, halved 1.
         assert_eq!(paper_texture(0.0, 0.0, 1), 1.0);
+        bansho_base::assert_measured!("equation (20): T at the origin", paper_texture(0.0, 0.0, 1), 1.0, 0.0);
         assert_eq!(paper_texture(0.0, 0.0, 5), 1.0);
         // x = pi/16: PHI = pi, PSI = (pi/2) sin(pi/2) = pi/2, so the term is 1 and its half 1/2.
         assert!((paper_texture(PI / 16.0, 0.0, 1) - 0.5).abs() < 1e-12);

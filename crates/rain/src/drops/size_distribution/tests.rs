@@ -26,7 +26,7 @@ fn counts_are_those_of_the_reference() {
         assert!(near(sizes.count([diameter, diameter + 0.2]), above, 1e-5));
     }
     let drops = DropSizeDistribution::marshall_palmer(20.0).count([0.9, 2.1]);
-    bansho_base::assert_measured!("drops of 0.9 to 2.1 mm in 1 m^3 at 20 mm/h", drops, 475.0, 0.5);
+    bansho_base::assert_measured!("equation (1): drops of 0.9 to 2.1 mm in 1 m^3 at 20 mm/h", drops, 475.0, 0.5);
 }
 
 #[test]

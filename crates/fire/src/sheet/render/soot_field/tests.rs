@@ -94,18 +94,20 @@ fn light_is_that_of_a_black_body_times_the_opacity() {
     let planes = draw(&sheet(parameters, None), &near_view(2.0), SIZE[1], None);
     let most = planes[1].iter().copied().fold(0.0, f32::max);
     let mut compared = 0;
+    let mut largest = 0.0_f32;
     for index in 0..planes[0].len() {
         let (kelvin, opacity) = (planes[KELVIN][index], 1.0 - planes[TRANSMITTANCE][index]);
         if kelvin > 700.0 {
             for (k, body) in color::black_body().radiance(kelvin).into_iter().enumerate() {
                 let wanted = body * scale * opacity;
-                assert!((planes[k][index] - wanted).abs() < 1e-3 * (wanted + 0.01 * most), "{k} {kelvin}");
+                largest = largest.max((planes[k][index] - wanted).abs() / (wanted + 0.01 * most));
             }
             assert!((opacity + math::f32::exp_m1(-planes[DEPTH][index])).abs() < 1e-3);
             compared += 1;
         }
     }
     assert!(compared > 100, "{compared}");
+    bansho_base::assert_measured!("future work: soot field: difference, %", 100.0 * f64::from(largest), 0.0, 0.1);
 }
 
 #[test]
@@ -130,7 +132,12 @@ fn flame_passes_into_dark_smoke_above_it() {
     let mean = |rows: &[[f32; 3]], k: usize| rows.iter().map(|row| row[k]).sum::<f32>() / rows.len() as f32;
     let (smoke, flame) = (&rows[top..top + quarter], &rows[bottom - quarter..=bottom]);
     assert!(mean(flame, 0) > 30.0 * mean(smoke, 0), "{} {}", mean(flame, 0), mean(smoke, 0));
-    bansho_base::assert_measured!("light of flame over smoke", f64::from(mean(flame, 0) / mean(smoke, 0)), 610.0, 5.0);
+    bansho_base::assert_measured!(
+        "picture 9: light of flame over smoke",
+        f64::from(mean(flame, 0) / mean(smoke, 0)),
+        610.0,
+        5.0
+    );
     assert!(mean(smoke, 1) > 0.5 && mean(smoke, 2) > 1.5 * mean(flame, 2), "smoke covers more than the flame");
 }
 
