@@ -377,7 +377,7 @@ fn thousands<const N: usize>(text: &str, frames: [i64; N]) -> [f64; N] {
 }
 
 #[test]
-#[ignore = "steps 120,000 to 340,000 particles 2100 times, about half an hour"]
+#[ignore = "steps 120,000 to 340,000 particles 2100 times, about a quarter of an hour"]
 fn the_scenes_have_the_numbers_of_particles_that_the_page_states() {
     let text = |number: usize| text(&format!("sekiguchi_paper_{number}.toml"));
     let check = |scene: &str, found: &[f64], stated: &[f64]| {

@@ -166,6 +166,7 @@ fn the_airlight_is_single_scattering_along_each_line_of_sight() {
     let beta = rain.extinction(1.0).all;
     let (scattering, shadows) = (&rain.optics.scattering, LampShadows::default());
     let lighting = DropLighting { scattering, lights: &[light], shadows: &shadows, extinction: beta };
+    let mut largest = 0.0_f64;
     for (x, y) in [(80, 20), (40, 32), (100, 40), (128, 16), (92, 33)] {
         let line = view.camera.direction(math::DVec2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap().normalize();
         let end = rain.near_reach();
@@ -179,10 +180,16 @@ fn the_airlight_is_single_scattering_along_each_line_of_sight() {
             })
             .sum();
         let found = f64::from(strip.radiance[1][y * SIZE[0] + x]);
-        assert!((found / expected - 1.0).abs() < 0.06, "{x} {y}: {found} {expected}");
+        largest = largest.max((found / expected - 1.0).abs());
         let through = f64::from(strip.transmittance(y * SIZE[0] + x)[1]);
         assert!((through - math::exp(-beta * end)).abs() < 2e-3, "{through}");
     }
+    bansho_base::assert_measured!(
+        "future work: scattering: difference from the sum along a line of sight",
+        largest,
+        0.0,
+        0.02
+    );
 }
 
 #[test]

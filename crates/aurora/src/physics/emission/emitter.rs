@@ -264,6 +264,19 @@ mod tests {
 
     #[test]
     fn the_five_colors_of_table_2_1_by_hand() {
+        // Table 2.1 as printed, lines to a tenth of a nanometer.
+        let printed = [
+            (557.7, [0.5739, 0.9993, 0.0018]),
+            (630.0, [0.6924, 0.2981, 0.0000]),
+            (391.4, [0.0049, 0.0005, 0.0239]),
+            (427.8, [0.2736, 0.0299, 1.4463]),
+            (670.5, [0.0893, 0.0345, 0.0000]),
+        ];
+        let is_line = |(nm, xyz): &&(f64, [f64; 3])| {
+            TABLE_2_1.iter().any(|(of_line, functions)| (of_line - nm).abs() < 0.05 && functions == xyz)
+        };
+        let lines = printed.iter().filter(is_line).count();
+        bansho_base::assert_measured!("table 2.1: lines as printed", lines as f64, 5.0, 0.0);
         // 3.24097 x 0.5739 - 1.53738 x 0.9993 - 0.498612 x 0.0018 = 0.322793; -0.556247 + 1.874647 + 0.000075 = 1.318475;
         // 0.031926 - 0.203833 + 0.001903 = -0.170005. Times 683.
         let [r, g, b] = table_2_1_srgb(557.7, 1.0);
