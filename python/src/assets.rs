@@ -167,8 +167,13 @@ pub(crate) fn codes_of<'a>(codes: &'a PyReadonlyArray3<u8>) -> PyResult<(Shape, 
     Ok((checked_shape(codes.shape())?, contiguous(codes.as_slice())?))
 }
 
+/// A picture of sRGB codes in rows, in the pool of the caller; alpha is straight and blends encoded values.
+pub(crate) fn picture_of_codes((shape, codes): (Shape, &[u8])) -> PyResult<Picture> {
+    picture(shape, pixels_of_codes(shape, codes), Encoding::DisplaySrgb)
+}
+
 /// Encoded values of 0 to 1 of codes, in the pool of the caller.
-pub(crate) fn pixels_of_codes(shape: Shape, codes: &[u8]) -> Vec<[f32; 4]> {
+fn pixels_of_codes(shape: Shape, codes: &[u8]) -> Vec<[f32; 4]> {
     /// The values of the codes.
     const VALUES: [f32; 256] = {
         let mut values = [0.0; 256];
@@ -277,8 +282,7 @@ impl Arrays {
     /// Pictures of sRGB codes.
     fn set_codes(&self, py: Python<'_>, name: &str, frames: Vec<PyReadonlyArray3<u8>>) -> PyResult<()> {
         let frames = frames.iter().map(codes_of).collect::<PyResult<Vec<_>>>()?;
-        let convert = |(shape, codes)| picture(shape, pixels_of_codes(shape, codes), Encoding::DisplaySrgb);
-        let pictures = work::run(py, 1, |_| frames.into_iter().map(convert).collect::<PyResult<_>>())??;
+        let pictures = work::run(py, 1, |_| frames.into_iter().map(picture_of_codes).collect::<PyResult<_>>())??;
         self.assets.set_pictures(name, pictures);
         Ok(())
     }

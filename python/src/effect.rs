@@ -14,7 +14,7 @@ use crate::{assets::Arrays, error, frame, scene, shot, value, work};
 /// A live effect: `bansho.Effect` is the class that users see.
 #[pyclass(module = "bansho._bansho", frozen)]
 pub(crate) struct Effect {
-    live: work::Exclusive<LiveEffect>,
+    live: work::PoolMutex<LiveEffect>,
     threads: usize,
 }
 
@@ -119,7 +119,7 @@ impl Effect {
         }
         let opened = work::run(py, threads, |interruption| effect.observer(Arc::new(interruption.clone())).open())?;
         let live = opened.map_err(|refused| error::effect(&refused))?;
-        Ok(Self { live: work::Exclusive::new(live), threads })
+        Ok(Self { live: work::PoolMutex::new(live), threads })
     }
 
     fn advance(&self, py: Python<'_>, dt: f64) -> PyResult<f64> {

@@ -28,7 +28,7 @@ const DEPTH: &str = "depth";
 /// Draws scenes over pictures of the same size, one after the other.
 #[pyclass(module = "bansho._bansho", frozen)]
 pub(crate) struct PlateShot {
-    state: work::Exclusive<State>,
+    state: work::PoolMutex<State>,
     threads: usize,
 }
 
@@ -60,9 +60,7 @@ enum Source<'a> {
 impl Source<'_> {
     fn picture(self) -> PyResult<Picture> {
         match self {
-            Self::Codes((shape, codes)) => {
-                assets::picture(shape, assets::pixels_of_codes(shape, codes), Encoding::DisplaySrgb)
-            }
+            Self::Codes(codes) => assets::picture_of_codes(codes),
             Self::Picture(picture) => Ok(picture),
         }
     }
@@ -157,7 +155,7 @@ impl PlateShot {
     #[new]
     fn new(threads: Option<i64>) -> PyResult<Self> {
         let assets = Arc::new(ArrayAssets::new(PathBuf::new(), 0));
-        Ok(Self { state: work::Exclusive::new(State { assets, shot: None }), threads: work::thread_count(threads)? })
+        Ok(Self { state: work::PoolMutex::new(State { assets, shot: None }), threads: work::thread_count(threads)? })
     }
 
     /// Draws frame `number` of the scene `text`, whose plate is `image` with `depth`. Codes (sRGB) become codes, floats (`encoding`) linear sRGB. With `truth`

@@ -13,7 +13,7 @@ use crate::{assets::Arrays, error, frame, scene, work};
 /// A shot: `bansho.Shot` is the class that users see.
 #[pyclass(module = "bansho._bansho", frozen)]
 pub(crate) struct Shot {
-    shot: work::Exclusive<bansho::Shot>,
+    shot: work::PoolMutex<bansho::Shot>,
     /// The plan of light, as for EXR files.
     light: Arc<Plan>,
     /// The plan of display codes, as for PNG files.
@@ -99,7 +99,7 @@ impl Shot {
             let info = phenomenon.info();
             aovs.extend(info.aovs.iter().map(|aov| (format!("{}.{}", info.name, aov.name), aov.unit, aov.doc)));
         }
-        let shot = work::Exclusive::new(bansho::Shot::open(compiled, light.clone()));
+        let shot = work::PoolMutex::new(bansho::Shot::open(compiled, light.clone()));
         Ok(Self { shot, light, finished, is_stepped, aovs, threads })
     }
 

@@ -123,7 +123,7 @@ fn in_pool<R: Send>(
     let (outcome, raised) = pool.in_place_scope(|scope| {
         let interruption = &interruption;
         scope.spawn(move |_| {
-            // What the work was changing is never used after a panic: see `Exclusive`.
+            // What the work was changing is never used after a panic: see `PoolMutex`.
             let outcome = catch_unwind(AssertUnwindSafe(|| work(interruption)));
             // The receiver outlives the scope.
             let _ = sender.send(outcome);
@@ -152,13 +152,13 @@ fn in_pool<R: Send>(
     }
 }
 
-/// What calls from several threads use one after the other, and none after a panic, which may have left it in pieces.
+/// A mutex around what work in a pool changes: calls from several threads use it one after the other, and none after a panic, which may have left it in pieces.
 ///
 /// The thread that calls takes it before its work enters the pool. A worker that took it within a job could wait there for itself: while it waits for the
 /// parts of one job, it takes on others.
-pub(crate) struct Exclusive<T>(Mutex<Option<T>>);
+pub(crate) struct PoolMutex<T>(Mutex<Option<T>>);
 
-impl<T: Send> Exclusive<T> {
+impl<T: Send> PoolMutex<T> {
     pub(crate) fn new(value: T) -> Self {
         Self(Mutex::new(Some(value)))
     }

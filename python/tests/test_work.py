@@ -136,14 +136,22 @@ def test_a_shot_may_be_used_from_several_threads(torch_scene):
     assert all(np.array_equal(results[number], expected[number]) for number in range(4))
 
 
-def rain_in_child(queue):
-    image = np.full((48, 64, 3), 90, np.uint8)
-    queue.put(bansho.rain(image, rate_mm_per_h=80, strength=10.0, seed=3).tobytes())
+def rain_over_gray():
+    return bansho.rain(np.full((48, 64, 3), 90, np.uint8), rate_mm_per_h=80, strength=10.0, seed=3).tobytes()
 
 
-def plate_in_child(queue):
-    """Opens a shot and an effect over an array, in a process whose parent has done the same."""
-    queue.put(over_an_array())
+def in_forked_process(work):
+    """What `work` returns in a process that is forked from this one."""
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=lambda: sender.send(work()))
+    process.start()
+    try:
+        assert receiver.poll(60), "the forked process waits forever"
+        return receiver.recv()
+    finally:
+        process.join(10)
+        process.kill()
 
 
 def over_an_array():
@@ -156,15 +164,7 @@ def over_an_array():
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_forked_process_opens_pictures_that_are_arrays():
     expected = over_an_array()
-    context = multiprocessing.get_context("fork")
-    queue = context.Queue()
-    process = context.Process(target=plate_in_child, args=(queue,))
-    process.start()
-    try:
-        assert queue.get(timeout=60) == expected
-    finally:
-        process.join(10)
-        process.kill()
+    assert in_forked_process(over_an_array) == expected
 
 
 def test_threads_that_share_a_shot_and_an_effect_wait_for_each_other():
@@ -193,14 +193,5 @@ def test_threads_that_share_a_shot_and_an_effect_wait_for_each_other():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_forked_process_draws_the_same():
-    image = np.full((48, 64, 3), 90, np.uint8)
-    expected = bansho.rain(image, rate_mm_per_h=80, strength=10.0, seed=3).tobytes()
-    context = multiprocessing.get_context("fork")
-    queue = context.Queue()
-    process = context.Process(target=rain_in_child, args=(queue,))
-    process.start()
-    try:
-        assert queue.get(timeout=60) == expected
-    finally:
-        process.join(10)
-        process.kill()
+    expected = rain_over_gray()
+    assert in_forked_process(rain_over_gray) == expected

@@ -228,10 +228,7 @@ impl Sink {
     /// Writes a frame that this sink has encoded.
     ///
     /// # Errors
-    /// The frame cannot be written, would replace a file that must stay, or is out of order.
-    ///
-    /// # Panics
-    /// A sink of another format encoded it.
+    /// The frame cannot be written, would replace a file that must stay, is out of order, or was encoded by a sink of another format.
     pub fn commit(&self, EncodedFrame { slot, bytes }: EncodedFrame) -> Result<(), MediaError> {
         match (&self.target, bytes) {
             (SinkTarget::Exr | SinkTarget::Png, EncodedBytes::File(bytes)) => {
@@ -240,7 +237,7 @@ impl Sink {
             (SinkTarget::Apng(film), EncodedBytes::Apng(encoded)) => film.push(slot.index, encoded),
             (SinkTarget::Gif(film, _), EncodedBytes::Gif(encoded)) => film.push(slot.index, encoded),
             (SinkTarget::Video(film, _), EncodedBytes::Video(encoded)) => film.push(slot.index, encoded),
-            _ => unreachable!("a frame is committed by the sink that encoded it"),
+            _ => Err(MediaError::WrongPicture { path: self.path(slot.number), expected: self.picture_format() }),
         }
     }
 

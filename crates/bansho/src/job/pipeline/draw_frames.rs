@@ -12,7 +12,7 @@ use bansho_render::{Target, display::DisplayFrame};
 
 use super::{
     FrameSource,
-    in_flight::{CompletionGuard, InFlightFrames, InOrder, StopOnFailure},
+    in_flight::{CommitQueue, CompletionGuard, InFlightFrames, StopOnFailure},
     snapshots::Snapshots,
 };
 use crate::job::{checks::memory::max_frames_with_pixels, error::JobError, observer::JobObserver};
@@ -157,7 +157,7 @@ pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
     }
     let in_flight = InFlightFrames::default();
     let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
-    let finished = InOrder::default();
+    let commits = CommitQueue::default();
     let (mut last, mut max_with_light) = (None, usize::MAX);
     let drawn = rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
@@ -171,7 +171,7 @@ pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
             let light_bytes = frame.light_bytes();
             max_with_light = max_frames_with_pixels(light_bytes, sink.writes_pixels());
             in_flight.submit(index, in_flight_limit(light_bytes, sink.max_in_flight()), frame.keeps_light());
-            spawn_finish(scope, (sink, &finished), &stop_on_failure, index, frame);
+            spawn_finish(scope, (sink, &commits), &stop_on_failure, index, frame);
         }
         Ok(())
     });
@@ -200,21 +200,21 @@ fn draw_independent<S: FrameSource, K: FrameSink>(
     let window = sources.len().min(sink.max_in_flight()).max(1);
     let in_flight = InFlightFrames::default();
     let stop_on_failure = StopOnFailure { observer, in_flight: &in_flight };
-    let (free, finished) = (Mutex::new(sources), InOrder::default());
+    let (free, commits) = (Mutex::new(sources), CommitQueue::default());
     rayon::in_place_scope_fifo(|scope| {
         for (index, &number) in numbers.iter().enumerate() {
             in_flight.submit(index, window, true);
             if stop_on_failure.cancelled() {
                 break;
             }
-            let (in_flight, free, finished, stop_on_failure) = (&in_flight, &free, &finished, &stop_on_failure);
+            let (in_flight, free, commits, stop_on_failure) = (&in_flight, &free, &commits, &stop_on_failure);
             scope.spawn_fifo(move |_| {
                 let _completion = CompletionGuard { in_flight, index };
                 // There are as many sources as frames in the window, and a frame returns its source before it leaves the window.
                 let Some(mut source) = lock(free).pop() else { return };
                 let encoded = draw_and_encode(&mut source, (index, number), sink, stop_on_failure);
                 lock(free).push(source);
-                finish(encoded, index, (sink, finished), stop_on_failure);
+                finish(encoded, index, (sink, commits), stop_on_failure);
             });
         }
     });
@@ -242,11 +242,11 @@ fn draw_and_encode<S: FrameSource, K: FrameSink>(
 fn finish<K: FrameSink>(
     encoded: Result<K::Encoded, JobError>,
     index: usize,
-    (sink, finished): (&K, &InOrder<K::Encoded>),
+    (sink, commits): (&K, &CommitQueue<K::Encoded>),
     observer: &StopOnFailure,
 ) {
     let committed = match encoded {
-        Ok(encoded) => finished.push(index, encoded, |index, encoded| sink.commit(index, encoded, observer)),
+        Ok(encoded) => commits.push(index, encoded, |index, encoded| sink.commit(index, encoded, observer)),
         Err(error) => Err((index, error)),
     };
     if let Err((index, error)) = committed {
@@ -262,7 +262,7 @@ fn lock<S>(sources: &Mutex<Vec<S>>) -> MutexGuard<'_, Vec<S>> {
 /// Finishes a drawn frame.
 fn spawn_finish<'scope, K: FrameSink>(
     scope: &rayon::ScopeFifo<'scope>,
-    (sink, finished): (&'scope K, &'scope InOrder<K::Encoded>),
+    (sink, commits): (&'scope K, &'scope CommitQueue<K::Encoded>),
     stop_on_failure: &'scope StopOnFailure,
     index: usize,
     mut frame: <K::Target as Target>::Frame,
@@ -279,7 +279,7 @@ fn spawn_finish<'scope, K: FrameSink>(
         if let Some(light) = frame.into_light() {
             in_flight.recycle(index, light);
         }
-        finish(encoded, index, (sink, finished), stop_on_failure);
+        finish(encoded, index, (sink, commits), stop_on_failure);
     });
 }
 

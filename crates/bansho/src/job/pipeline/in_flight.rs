@@ -121,7 +121,7 @@ fn follows_from_another(error: &JobError) -> bool {
 }
 
 /// Commits encoded frames in the order of the job, whichever threads have encoded them: none is written after one that failed.
-pub(crate) struct InOrder<E>(Mutex<Waiting<E>>);
+pub(crate) struct CommitQueue<E>(Mutex<Waiting<E>>);
 
 struct Waiting<E> {
     /// Index of the frame that is committed next.
@@ -131,13 +131,13 @@ struct Waiting<E> {
     is_committing: bool,
 }
 
-impl<E> Default for InOrder<E> {
+impl<E> Default for CommitQueue<E> {
     fn default() -> Self {
         Self(Mutex::new(Waiting { next: 0, encoded: BTreeMap::new(), is_committing: false }))
     }
 }
 
-impl<E> InOrder<E> {
+impl<E> CommitQueue<E> {
     fn lock(&self) -> MutexGuard<'_, Waiting<E>> {
         // The lock is only held for inserts and removals.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -254,7 +254,7 @@ mod tests {
 
     #[test]
     fn frames_are_committed_in_order_and_none_after_one_that_failed() {
-        let order = InOrder::default();
+        let order = CommitQueue::default();
         let committed = Mutex::new(Vec::new());
         let push = |index: usize| {
             order.push(index, index, |index, _| {
