@@ -188,15 +188,17 @@ fn benches(criterion: &mut Criterion) {
     }
     group.finish();
 
-    let mut group = criterion.benchmark_group("sph parts, 100000 in space, 2 threads");
-    group.sample_size(20);
-    let pool = pinned_pool(2);
-    let mut simulation = Simulation::<3>::new(100_000);
-    simulation.step();
-    group.bench_function("cells", |bencher| pool.install(|| bencher.iter(|| simulation.sort())));
-    group.bench_function("density", |bencher| pool.install(|| bencher.iter(|| simulation.densities())));
-    group.bench_function("pressure", |bencher| pool.install(|| bencher.iter(|| simulation.forces())));
-    group.finish();
+    for (threads, name) in [(1, "sph parts, 100000 in space, 1 thread"), (2, "sph parts, 100000 in space, 2 threads")] {
+        let mut group = criterion.benchmark_group(name);
+        group.sample_size(20);
+        let pool = pinned_pool(threads);
+        let mut simulation = Simulation::<3>::new(100_000);
+        pool.install(|| simulation.step());
+        group.bench_function("cells", |bencher| pool.install(|| bencher.iter(|| simulation.sort())));
+        group.bench_function("density", |bencher| pool.install(|| bencher.iter(|| simulation.densities())));
+        group.bench_function("pressure", |bencher| pool.install(|| bencher.iter(|| simulation.forces())));
+        group.finish();
+    }
 
     let mut group = criterion.benchmark_group("burning gas, 1 thread");
     group.sample_size(20);

@@ -147,7 +147,7 @@ impl<const D: usize> SmoothingKernel<D> for Spiky<D> {
     fn gradient_factor<R: Real>(&self, distance_squared: R) -> R {
         let q_squared = distance_squared * distance_squared.broadcast(self.0.to_q_squared);
         let inverse_q = q_squared.simd_rsqrt();
-        let rest = q_squared.fma(q_squared.broadcast(0.0) - inverse_q, q_squared.broadcast(1.0));
+        let rest = (-q_squared).fma(inverse_q, q_squared.broadcast(1.0));
         (rest * rest) * (inverse_q * q_squared.broadcast(self.0.gradient))
     }
 }

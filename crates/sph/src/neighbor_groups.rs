@@ -17,7 +17,7 @@ const GROUPS_PER_TASK: usize = 32;
 #[derive(Clone, Debug, Default)]
 pub(super) struct GroupBatch {
     pub(super) groups: Vec<Group>,
-    /// Candidate neighbors of all groups, one after the other.
+    /// Candidate neighbors of all groups, one after the other, and unused entries after them.
     pub(super) candidates: Vec<u32>,
 }
 
@@ -144,7 +144,6 @@ impl GroupBatch {
     ) {
         let Self { groups, candidates } = self;
         groups.clear();
-        candidates.clear();
         let Some(first) = chunks.first() else { return };
         let mut neighbor_runs = rows.neighbor_runs(first);
         let mut count_so_far = 0;
@@ -153,7 +152,10 @@ impl GroupBatch {
             let bounds = BoundingBox::of(positions, particles.clone());
             let runs = neighbor_runs.near(chunk);
             let max_candidates: usize = runs.iter().map(|run| run.len() + BATCH).sum();
-            candidates.resize(count_so_far + max_candidates, 0);
+            // Entries of earlier steps are overwritten: filling them with 0 first would take as long as writing the list.
+            if candidates.len() < count_so_far + max_candidates {
+                candidates.resize(count_so_far + max_candidates, 0);
+            }
             let first = count_so_far;
             for run in runs {
                 let free = &mut candidates[count_so_far..];
@@ -161,7 +163,6 @@ impl GroupBatch {
             }
             groups.push(Group { particles, candidates: first..count_so_far });
         }
-        candidates.truncate(count_so_far);
     }
 }
 

@@ -5,7 +5,7 @@
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{__m256, _mm256_shuffle_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps};
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::approximations::ROUNDING_MAGIC;
 use fearless_simd::{Level, Simd, f32x4, f32x8, f32x16, prelude::*, u32x16};
@@ -18,7 +18,9 @@ pub use super::vector_level::{VectorLevel, VectorLevelError, level, set_vector_l
 pub const LANES: usize = 16;
 
 /// A scalar or a vector. Multiply-adds are fused at every vector width, so that all widths give the same bits.
-pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
+pub trait Real:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
     /// `value` in every lane of a vector as wide as `self`. (`splat` is the name of the constructor in `fearless_simd`.)
     #[must_use]
     fn broadcast(self, value: f32) -> Self;
@@ -103,7 +105,7 @@ const RSQRT_MAGIC: u32 = 0x5f34_0000;
 #[inline(always)]
 fn refine_rsqrt<R: Real>(value: R, guess: R) -> R {
     let splat = |constant: f32| value.broadcast(constant);
-    let error = (splat(0.0) - value * guess).fma(guess, splat(1.0));
+    let error = (-(value * guess)).fma(guess, splat(1.0));
     let low = error.fma(splat(0.500_001_4), splat(1.0));
     let high = error.fma(splat(0.311_153_4), splat(0.374_954_5));
     let square = error * error;
