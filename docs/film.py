@@ -40,12 +40,12 @@ class Shot:
 
 SHOTS = [
     Shot("worlds/campfire_in_camp", 40, 3.0),
-    Shot("worlds/fire_in_courtyard", 30, 3.0),
+    Shot("fire_in_court", 30, 3.0),
     Shot("volumes/bonfire", 0, 3.0),
     Shot("volumes/fireball", 4, 1.5),
     Shot("worlds/rain_in_street", 30, 2.5),
     Shot("headlights", 20, 2.5),
-    Shot("worlds/rain_in_garden", 30, 2.5),
+    Shot("downpour_day", 30, 2.5),
     Shot("worlds/aurora_over_fjord", 30, 3.5, speed=2),
     Shot("red_aurora", 60, 2.5, speed=2),
     Shot("corona", 20, 2.5, speed=2),

@@ -265,7 +265,7 @@ const plated = await open("torch");
 const dark = await until(plated, picture, isDrawn, "no picture of a flame");
 await mustNotFreeze(plated, "a plate", 4, async () => {
   const asked = await chooserOf(plated);
-  await asked.setFiles(fileURLToPath(new URL("../../../scenes/plates/grove.jpg", import.meta.url)));
+  await asked.setFiles(fileURLToPath(new URL("../../../scenes/plates/garden.jpg", import.meta.url)));
 });
 const lit = await until(plated, picture, ({ mean }) => mean > 4 * dark.mean, "no plate behind the flame");
 console.log(`before a plate: mean ${lit.mean.toFixed(1)}, alone ${dark.mean.toFixed(1)}`);

@@ -1,5 +1,5 @@
-//! Frames that are drawn and not yet written. Their number is bounded, so that memory does not grow. They are written in order, and of several failures that of the
-//! first frame is kept.
+//! Frames that are drawn and not yet written. Their number is bounded, so that memory does not grow. They are written in order, and if several fail, the error of the earliest frame is
+//! kept.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn it_swings_within_one_about_zero() {
+    fn fluctuation_is_within_one_and_has_mean_zero() {
         let swing = fluctuation(|f| f);
         let values: Vec<f32> = (0..40_000).map(|i| swing.at(f64::from(i) * 0.01)).collect();
         let mean = values.iter().sum::<f32>() / values.len() as f32;
