@@ -1,6 +1,6 @@
 //! Drawing targets of phenomena: strips of a picture, each owned by one thread.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 use glam::{DVec2, DVec3};
@@ -440,6 +440,11 @@ impl Strip {
     /// Depth of the plate, m; infinite without a plate.
     pub fn plate_depth(&self, index: usize) -> f32 {
         self.plate_depth.get(index).copied().unwrap_or(f32::INFINITY)
+    }
+
+    /// Depths of the plate in consecutive pixels, m; empty without a plate.
+    pub fn plate_depths(&self, pixels: Range<usize>) -> &[f32] {
+        self.plate_depth.get(pixels).unwrap_or_default()
     }
 
     /// Whether a plate's depth may hide samples.

@@ -50,12 +50,11 @@ impl OpticalDepthTable {
     /// Sixteen distances (m) in the table.
     #[inline(always)]
     fn locate(&self, distances: &LaneArray) -> TablePositions {
-        let (mut low, mut high) = (distances[0], distances[0]);
-        for i in 1..LANES {
-            low = distances[i].simd_min(low);
-            high = distances[i].simd_max(high);
-        }
-        let [first, last] = [low, high].map(|distance| self.interval(distance));
+        let [low, high] = extremes(distances);
+        // Before the first stored distance but 0, where most lines of sight begin, nothing is searched for.
+        let first = if low < self.distances[1] { 0 } else { self.interval(low) };
+        let is_in_one = first + 1 == self.intervals.len() || high < self.distances[first + 1];
+        let last = if is_in_one { first } else { self.interval(high) };
         let mut positions = TablePositions { index: [first as u32; LANES], fraction: ZERO_LANES, depth: ZERO_LANES };
         // Neighboring pixels are mostly in the same interval.
         for start in &self.distances[first + 1..=last] {
@@ -64,11 +63,18 @@ impl OpticalDepthTable {
             }
         }
         let mut columns = [ZERO_LANES; 4];
-        for i in 0..LANES {
-            // One load of four neighboring numbers for each lane, instead of four gathers; the arithmetic after it is vectorized.
-            let interval = self.intervals[positions.index[i] as usize];
+        if first == last {
+            let interval = self.intervals[first];
             for c in 0..4 {
-                columns[c][i] = interval[c];
+                columns[c] = [interval[c]; LANES];
+            }
+        } else {
+            for i in 0..LANES {
+                // One load of four neighboring numbers for each lane, instead of four gathers; the arithmetic after it is vectorized.
+                let interval = self.intervals[positions.index[i] as usize];
+                for c in 0..4 {
+                    columns[c][i] = interval[c];
+                }
             }
         }
         let [start, inverse_width, depth, increase] = &columns;
@@ -89,6 +95,21 @@ impl OpticalDepthTable {
             positions.fraction[i] = if is_beyond { 1.0 } else { positions.fraction[i] };
         }
     }
+}
+
+/// The smallest and the largest of sixteen numbers, by halves, so that the comparisons do not wait for each other.
+#[inline(always)]
+fn extremes(values: &LaneArray) -> [f32; 2] {
+    let (mut low, mut high) = (*values, *values);
+    let mut half = LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            low[i] = low[i].simd_min(low[i + half]);
+            high[i] = high[i].simd_max(high[i + half]);
+        }
+        half /= 2;
+    }
+    [low[0], high[0]]
 }
 
 /// Sixteen positions between stored distances.
@@ -245,5 +266,37 @@ impl RaySegments {
             sums[i] = 2.0 - approximations::exp(-self.depths[0][i]) - approximations::exp(-self.depths[1][i]);
         }
         sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::math::{random::Key, random::Purpose};
+
+    use super::*;
+
+    #[test]
+    fn sixteen_distances_are_located_as_each_one_alone() {
+        let distances = [0.0, 0.5, 1.0, 4.0, 9.0, 20.0];
+        let depths = [0.0, 0.1, 0.15, 0.7, 1.0, 3.0];
+        let table = OpticalDepthTable::new(&distances, &depths, 5);
+        let numbers: Vec<f32> = (0..40).flat_map(|step| Key::new(5, "table").uniforms(0, step, Purpose(0))).collect();
+        // Within one interval, over several, before the first and beyond the last.
+        for (start, range) in [(0.1, 0.3), (0.5, 0.49), (4.0, 5.0), (0.0, 25.0), (3.0, 2.0), (19.0, 9.0), (21.0, 2.0)] {
+            for sixteen in numbers.as_chunks::<LANES>().0 {
+                let located = sixteen.map(|number| start + range * number);
+                let positions = table.locate(&located);
+                for i in 0..LANES {
+                    let next = distances.iter().position(|stored| *stored > f64::from(located[i])).unwrap_or(5).max(1);
+                    let [from, to] = [distances[next - 1] as f32, distances[next] as f32];
+                    let fraction = ((located[i] - from) / (to - from)).clamp(0.0, 1.0);
+                    let depth = depths[next - 1] + fraction * (depths[next] - depths[next - 1]);
+                    assert_eq!(positions.index[i] as usize, next - 1, "{}", located[i]);
+                    assert!(
+                        (positions.fraction[i] - fraction).abs() < 1e-6 && (positions.depth[i] - depth).abs() < 1e-6
+                    );
+                }
+            }
+        }
     }
 }

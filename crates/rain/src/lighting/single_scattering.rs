@@ -293,10 +293,8 @@ impl<'a> SingleScattering<'a> {
                 let first = (y - strip.rect.y) * strip.rect.width + visible.start - strip.rect.x;
                 // Other pixels are hidden.
                 let mut plate = ZERO_LANES;
-                for x in visible.clone() {
-                    plate[x - left] = strip.plate_depth(first + x - visible.start);
-                }
                 let within = visible.start - left..visible.end - left;
+                plate[within.clone()].copy_from_slice(strip.plate_depths(first..first + within.len()));
                 if let Some(layer) = self.sixteen_pixels(column, column - columns.start, y, row, &sums, slice, &plate) {
                     add_layer(strip, first, &layer, within);
                 }
@@ -364,6 +362,13 @@ fn between(rows: &[Vec<[f32; 4]>; 2], column: usize, c: usize, down: f32) -> f32
 /// Adds a part of sixteen pixels under the contents of a strip, the first at its pixel `first`.
 #[inline(always)]
 fn add_layer(strip: &mut Strip, first: usize, layer: &Layer, part: Range<usize>) {
+    if part.len() == LANES {
+        // Of a length that is known when it is compiled.
+        let [red, green, blue, opacity] = layer;
+        strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH);
+        add_optical_depths(&mut strip.aovs, first, opacity);
+        return;
+    }
     let [red, green, blue, opacity] = layer.each_ref().map(|row| &row[part.clone()]);
     strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH[..part.len()]);
     add_optical_depths(&mut strip.aovs, first, opacity);
