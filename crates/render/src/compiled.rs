@@ -129,6 +129,12 @@ impl CompiledScene {
         Some(self.plate_boxes.get_or_compute(key, || PlateBoxes::new(&picture, alpha, &view)))
     }
 
+    /// Where the boxes of the plate are kept, if frame `number` shows them and no other sky lights the scene.
+    pub(crate) fn plate_boxes_cache(&self, number: i64) -> Option<&PlateBoxesCache> {
+        let is_shown = number == self.scene.picture.first_frame && self.scene.tables.sky(0.0).is_none();
+        is_shown.then_some(self.plate_boxes.as_ref())
+    }
+
     /// Whether the plate covers the picture: it has one, whose image is opaque in the first frame.
     pub fn has_opaque_plate(&self) -> bool {
         self.plate_image().is_some_and(is_opaque)

@@ -2,7 +2,7 @@
 
 use std::{
     ops::Range,
-    sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use bansho_base::{
@@ -13,6 +13,7 @@ use bansho_base::{
     },
     math::simd,
 };
+use fearless_simd::dispatch;
 
 /// Boxes along a plate's longer side.
 const BOXES: usize = 256;
@@ -51,19 +52,23 @@ impl PlateBoxes {
     /// The boxes of `picture`, whose alpha blends as `alpha` says, with `view` inverted where it is made for display.
     pub(crate) fn new(picture: &Picture, alpha: PictureAlpha, view: &color::View) -> Self {
         let size = [picture.color.width(), picture.color.height()];
-        let side = size[0].max(size[1]).div_ceil(BOXES).max(1);
+        let side = box_side(size);
         let source = PlateRows { picture, alpha, view };
         let brightest = match picture.encoding {
             Encoding::DisplaySrgb => CLIPPED_LUMINANCE,
             Encoding::LinearSrgb | Encoding::LinearAcescg => BRIGHTEST_LUMINANCE * source.typical_luminance(),
         };
-        let rows: Vec<(Vec<[f32; 3]>, usize)> = (0..size[1].div_ceil(side))
+        let rows: Vec<BoxRow> = (0..size[1].div_ceil(side))
             .into_par_iter()
             .map(|row| source.box_row(row * side..((row + 1) * side).min(size[1]), side, brightest))
             .collect();
-        let is_linear = picture.encoding != Encoding::DisplaySrgb;
-        let limited = rows.iter().filter(|_| is_linear).map(|(_, limited)| limited).sum();
-        Self { size, side, light: rows.into_iter().flat_map(|(light, _)| light).collect(), limited }
+        let boxes = Self::of_rows(size, &rows);
+        if picture.encoding == Encoding::DisplaySrgb { boxes } else { Self { limited: limited(&rows), ..boxes } }
+    }
+
+    /// The boxes of a photograph of `size`, from all rows of boxes.
+    pub(crate) fn of_rows(size: [usize; 2], rows: &[BoxRow]) -> Self {
+        Self { size, side: box_side(size), light: rows.iter().flat_map(BoxRow::means).collect(), limited: 0 }
     }
 
     /// Width and height of the plate, pixels.
@@ -76,15 +81,101 @@ impl PlateBoxes {
         (self.side * self.side) as f64
     }
 
-    /// The boxes in rows from the top.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = PlateBox> {
+    /// Number of boxes.
+    pub(crate) fn len(&self) -> usize {
+        self.light.len()
+    }
+
+    /// The box with this index, in rows from the top.
+    pub(crate) fn at(&self, index: usize) -> PlateBox {
         let columns = self.size[0].div_ceil(self.side);
-        self.light.iter().enumerate().map(move |(index, &light)| {
-            let from = [index % columns, index / columns].map(|step| step * self.side);
-            let sides = [0, 1].map(|axis| self.side.min(self.size[axis] - from[axis]));
-            PlateBox { center: [0, 1].map(|axis| from[axis] + sides[axis] / 2), pixels: sides[0] * sides[1], light }
+        let from = [index % columns, index / columns].map(|step| step * self.side);
+        let sides = [0, 1].map(|axis| self.side.min(self.size[axis] - from[axis]));
+        PlateBox {
+            center: [0, 1].map(|axis| from[axis] + sides[axis] / 2),
+            pixels: sides[0] * sides[1],
+            light: self.light[index],
+        }
+    }
+
+    /// The boxes in rows from the top.
+    #[cfg(test)]
+    pub(crate) fn iter(&self) -> impl Iterator<Item = PlateBox> {
+        (0..self.len()).map(|index| self.at(index))
+    }
+}
+
+/// Side of a box of a plate of `size`, pixels.
+pub(crate) fn box_side(size: [usize; 2]) -> usize {
+    size[0].max(size[1]).div_ceil(BOXES).max(1)
+}
+
+/// Whether the light of the boxes is that of the pixels of the plate as they are drawn, so that both are decoded at once.
+pub(crate) fn is_drawn_light(picture: &Picture, alpha: PictureAlpha) -> bool {
+    picture.encoding == Encoding::DisplaySrgb && alpha != PictureAlpha::Straight(color::AlphaConvention::Linear)
+}
+
+/// Number of pixels in rows of boxes that were brighter than is taken.
+fn limited(rows: &[BoxRow]) -> usize {
+    rows.iter().map(|row| row.limited).sum()
+}
+
+/// A row of boxes, whose rows of pixels are added one after the other.
+pub(crate) struct BoxRow {
+    /// Side of a box, pixels.
+    side: usize,
+    /// Largest luminance that is taken.
+    brightest: f32,
+    /// The sum over each box: red, green and blue, and a number without meaning, so that a pixel is added by a single instruction.
+    sums: Vec<[f64; 4]>,
+    width: usize,
+    /// Number of rows of pixels.
+    rows: usize,
+    /// Number of pixels that were brighter than is taken.
+    limited: usize,
+}
+
+impl BoxRow {
+    /// A row of boxes of a photograph of `size`, without any pixels.
+    pub(crate) fn of_photograph(size: [usize; 2]) -> Self {
+        Self::new(size[0], box_side(size), CLIPPED_LUMINANCE)
+    }
+
+    fn new(width: usize, side: usize, brightest: f32) -> Self {
+        Self { side, brightest, sums: vec![[0.0; 4]; width.div_ceil(side)], width, rows: 0, limited: 0 }
+    }
+
+    /// Adds a row of pixels.
+    pub(crate) fn add(&mut self, light: &[[f32; 4]]) {
+        let Self { side, brightest, sums, .. } = self;
+        self.limited += dispatch!(simd::level(), _simd => add_to_boxes(light, *side, *brightest, sums));
+        self.rows += 1;
+    }
+
+    /// The mean light of each box.
+    fn means(&self) -> impl Iterator<Item = [f32; 3]> {
+        self.sums.iter().enumerate().map(|(column, [red, green, blue, _])| {
+            let count = (self.side.min(self.width - column * self.side) * self.rows) as f64;
+            [red, green, blue].map(|sum| (sum / count) as f32)
         })
     }
+}
+
+/// Adds a row of pixels to the sums over its boxes. Returns how many are more luminous than `brightest`.
+#[inline(always)]
+fn add_to_boxes(light: &[[f32; 4]], side: usize, brightest: f32, sums: &mut [[f64; 4]]) -> usize {
+    let mut limited = 0;
+    for (sum, pixels) in sums.iter_mut().zip(light.chunks(side)) {
+        for &[r, g, b, _] in pixels {
+            let ([red, green, blue], is_limited) = limit([r, g, b], brightest);
+            limited += usize::from(is_limited);
+            let taken = [red, green, blue, 0.0];
+            for c in 0..4 {
+                sum[c] += f64::from(taken[c]);
+            }
+        }
+    }
+    limited
 }
 
 /// Rows of a plate as light.
@@ -105,8 +196,8 @@ impl PlateRows<'_> {
         let values = row.iter().map(|pixel| if multiplies_light { *pixel } else { self.alpha.premultiplied(*pixel) });
         match self.picture.encoding {
             Encoding::DisplaySrgb => {
-                light.extend(values.map(|[r, g, b, alpha]| [decoded(r), decoded(g), decoded(b), alpha]));
-                self.view.to_scene_row(simd::level(), light);
+                light.extend(values);
+                self.view.encoded_to_scene_row(simd::level(), light);
             }
             Encoding::LinearSrgb => {
                 light.extend(values.map(|[r, g, b, alpha]| {
@@ -147,42 +238,17 @@ impl PlateRows<'_> {
         [sum, count]
     }
 
-    /// The mean light of a row of boxes, which are these `rows` of pixels, and the number of pixels that are brighter than `brightest`.
-    fn box_row(&self, rows: Range<usize>, side: usize, brightest: f32) -> (Vec<[f32; 3]>, usize) {
+    /// The row of boxes that are these `rows` of pixels. No pixel counts as more luminous than `brightest`.
+    fn box_row(&self, rows: Range<usize>, side: usize, brightest: f32) -> BoxRow {
         let width = self.picture.color.width();
-        let (mut sums, mut limited) = (vec![[0.0_f64; 3]; width.div_ceil(side)], 0);
+        let mut boxes = BoxRow::new(width, side, brightest);
         let mut light = Vec::with_capacity(width);
-        for y in rows.clone() {
+        for y in rows {
             self.light(y, &mut light);
-            for (sum, pixels) in sums.iter_mut().zip(light.chunks(side)) {
-                for &[r, g, b, _] in pixels {
-                    let (taken, is_limited) = limit([r, g, b], brightest);
-                    limited += usize::from(is_limited);
-                    (0..3).for_each(|c| sum[c] += f64::from(taken[c]));
-                }
-            }
+            boxes.add(&light);
         }
-        let mut means = Vec::with_capacity(sums.len());
-        for (column, sum) in sums.iter().enumerate() {
-            let count = (side.min(width - column * side) * rows.len()) as f64;
-            means.push(sum.map(|sum| (sum / count) as f32));
-        }
-        (means, limited)
+        boxes
     }
-}
-
-/// Light of an encoded value, by a table for the codes of 8 bits.
-#[inline]
-pub(crate) fn decoded(value: f32) -> f32 {
-    /// The value of each code, and its light: a comparison instead of a division, which is most of the time of a plate.
-    static CODES: LazyLock<[[f32; 2]; 256]> = LazyLock::new(|| {
-        std::array::from_fn(|code| {
-            let value = code as f32 / 255.0;
-            [value, color::decode_srgb(value)]
-        })
-    });
-    let [code_value, light] = CODES[usize::from((value * 255.0 + 0.5) as u8)];
-    if code_value == value { light } else { color::decode_srgb(value) }
 }
 
 /// Luminance of light, without negative values and what is not finite.
@@ -191,18 +257,22 @@ fn luminance(light: [f32; 3]) -> f32 {
 }
 
 /// A component without negative values; NaN is 0.
+#[inline(always)]
 fn known(value: f32) -> f32 {
-    if value > 0.0 { value.min(LARGEST_COMPONENT) } else { 0.0 }
+    let bounded = if value < LARGEST_COMPONENT { value } else { LARGEST_COMPONENT };
+    if value > 0.0 { bounded } else { 0.0 }
 }
 
 /// Light without negative values and at most as luminous as `brightest`, and whether it was brighter.
-fn limit(light: [f32; 3], brightest: f32) -> ([f32; 3], bool) {
-    let light = light.map(known);
-    let luminance = color::luminance(light);
+#[inline(always)]
+fn limit([r, g, b]: [f32; 3], brightest: f32) -> ([f32; 3], bool) {
+    let [r, g, b] = [known(r), known(g), known(b)];
+    let luminance = color::luminance([r, g, b]);
     if luminance <= brightest {
-        return (light, false);
+        return ([r, g, b], false);
     }
-    (light.map(|value| value * (brightest / luminance)), true)
+    let factor = brightest / luminance;
+    ([r * factor, g * factor, b * factor], true)
 }
 
 /// The boxes of the plate of a scene, which are computed once for each plate and view.
@@ -221,6 +291,16 @@ pub(crate) struct PlateBoxesKey {
 impl PlateBoxesCache {
     fn lock(&self) -> MutexGuard<'_, Option<(PlateBoxesKey, Arc<PlateBoxes>)>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether there are boxes of this key.
+    pub(crate) fn has(&self, key: &PlateBoxesKey) -> bool {
+        self.lock().as_ref().is_some_and(|(cached, _)| cached == key)
+    }
+
+    /// Keeps the boxes of a key.
+    pub(crate) fn insert(&self, key: PlateBoxesKey, boxes: PlateBoxes) {
+        *self.lock() = Some((key, Arc::new(boxes)));
     }
 
     /// The boxes of this key, computed by `compute` if they are not known.

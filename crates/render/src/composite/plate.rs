@@ -6,7 +6,7 @@ use bansho_base::{
     camera::Camera,
     color::{self, AlphaConvention},
     host::{
-        assets::{Assets, Encoding, Picture, PictureAlpha},
+        assets::{Encoding, Picture, PictureAlpha},
         parallel::prelude::*,
     },
     image::Image,
@@ -16,10 +16,14 @@ use bansho_base::{
 
 use super::{
     plate_depth::resample_depth,
-    plate_mapping::{PlateMapping, filter_taps},
+    plate_mapping::{PlateMapping, filter_taps, image_in},
     plate_surface::{PlateSurface, SurfaceInputs},
 };
-use crate::{plan::Plan, plate_boxes::decoded};
+use crate::{
+    compiled::CompiledScene,
+    plan::Plan,
+    plate_boxes::{self, BoxRow, PlateBoxes, PlateBoxesKey},
+};
 use bansho_scene::{PlatePictures, PlateSky};
 
 /// A plate, as large as the picture with its overscan.
@@ -35,18 +39,39 @@ pub(crate) struct PlateFrame {
     pub(crate) surface: Option<Arc<PlateSurface>>,
 }
 
-/// The plate of frame `number` for `camera`.
+/// The plate of frame `number` for `camera`. Its picture has this digest. The memory of `recycled` is used again.
 ///
 /// # Errors
 /// The picture or its depth cannot be read.
-pub(crate) fn load(plan: &Plan, assets: &dyn Assets, number: i64, camera: &Camera) -> Result<PlateFrame, BuildError> {
-    let read = plan.scene.plate.read_frame(assets, number, &plan.plate_view(number))?;
+pub(crate) fn load(
+    plan: &Plan,
+    compiled: &CompiledScene,
+    number: i64,
+    camera: &Camera,
+    digest: Option<[u8; 32]>,
+    recycled: PlateFrame,
+) -> Result<PlateFrame, BuildError> {
+    let read = plan.scene.plate.read_frame(compiled.assets().as_ref(), number, &plan.plate_view(number))?;
     let Some(PlatePictures { image, alpha, depth: plate_depth, surfaces, .. }) = read else {
         return Ok(PlateFrame::default());
     };
     let mapping = PlateMapping::new(plan, [image.color.width(), image.color.height()]);
-    let mut color = resample_color(plan, &image, alpha, &mapping);
-    let mut depth = plate_depth.as_ref().map(|depth| resample_depth(camera, depth, &mapping));
+    let view = plan.view_transform();
+    let mut color = if mapping.is_identity() {
+        let memory = image_in(recycled.color, mapping.plate, [0.0; 4]);
+        let boxes = digest.map(|digest| PlateBoxesKey { digest, alpha, view }).zip(compiled.plate_boxes_cache(number));
+        match boxes.filter(|(key, cache)| plate_boxes::is_drawn_light(&image, alpha) && !cache.has(key)) {
+            Some((key, cache)) => {
+                let (color, boxes) = decode_with_boxes(&view, &image, alpha, memory);
+                cache.insert(key, boxes);
+                color
+            }
+            None => decode(&view, &image, alpha, memory),
+        }
+    } else {
+        resample_color(&view, &image, alpha, &mapping)
+    };
+    let mut depth = plate_depth.as_ref().map(|depth| resample_depth(camera, depth, &mapping, recycled.depth));
     let has_no_sky = plan.scene.plate.sky == PlateSky::Scene;
     if let Some(depth) = depth.as_ref().filter(|_| has_no_sky) {
         remove_sky(&mut color, depth);
@@ -67,9 +92,47 @@ pub(crate) fn load(plan: &Plan, assets: &dyn Assets, number: i64, camera: &Camer
     Ok(PlateFrame { color: Some(color), is_transparent, depth, surface })
 }
 
-fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: &PlateMapping) -> Image<4> {
+/// The colors of a plate whose pixels are those of the picture, in an image of its size.
+fn decode(view: &color::View, picture: &Picture, alpha: PictureAlpha, mut image: Image<4>) -> Image<4> {
+    let rows = image.pixels_mut().par_chunks_mut(picture.color.width()).enumerate();
+    rows.for_each(|(y, row)| decode_row(view, picture, alpha, y, row));
+    image
+}
+
+/// [`decode`], and the boxes of the plate, to which rows are added while they are in the cache.
+fn decode_with_boxes(
+    view: &color::View,
+    picture: &Picture,
+    alpha: PictureAlpha,
+    mut image: Image<4>,
+) -> (Image<4>, PlateBoxes) {
+    let size = [picture.color.width(), picture.color.height()];
+    let side = plate_boxes::box_side(size);
+    let tasks = image.pixels_mut().par_chunks_mut(side * size[0]).enumerate();
+    let decoded = tasks.map(|(index, rows)| {
+        let mut boxes = BoxRow::of_photograph(size);
+        for (y, row) in (index * side..).zip(rows.chunks_mut(size[0])) {
+            decode_row(view, picture, alpha, y, row);
+            boxes.add(row);
+        }
+        boxes
+    });
+    let box_rows: Vec<BoxRow> = decoded.collect();
+    (image, PlateBoxes::of_rows(size, &box_rows))
+}
+
+/// Row `y` of a plate.
+fn decode_row(view: &color::View, picture: &Picture, alpha: PictureAlpha, y: usize, row: &mut [[f32; 4]]) {
+    row.copy_from_slice(picture.color.row(y));
+    if let PictureAlpha::Straight(_) = alpha {
+        row.iter_mut().for_each(|pixel| *pixel = alpha.premultiplied(*pixel));
+    }
+    row_over_black(view, picture.encoding, alpha, row);
+}
+
+/// The colors of a plate in the pixels of the picture.
+fn resample_color(view: &color::View, picture: &Picture, alpha: PictureAlpha, mapping: &PlateMapping) -> Image<4> {
     let columns: Vec<_> = (0..mapping.picture[0]).map(|x| filter_taps(mapping, 0, x)).collect();
-    let view = plan.view_transform();
     let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [0.0; 4]);
     let covered = mapping.covered_columns();
     image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, row)| {
@@ -77,12 +140,6 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
             return;
         }
         let row = &mut row[covered.clone()];
-        if mapping.is_identity() {
-            let own = picture.color.row(y);
-            row.iter_mut().zip(own).for_each(|(pixel, color)| *pixel = alpha.premultiplied(*color));
-            row_over_black(&view, picture.encoding, alpha, row);
-            return;
-        }
         let rows = filter_taps(mapping, 1, y);
         for (pixel, columns) in row.iter_mut().zip(&columns[covered.clone()]) {
             let mut sum = [0.0_f32; 4];
@@ -96,7 +153,7 @@ fn resample_color(plan: &Plan, picture: &Picture, alpha: PictureAlpha, mapping: 
             }
             *pixel = sum;
         }
-        row_over_black(&view, picture.encoding, alpha, row);
+        row_over_black(view, picture.encoding, alpha, row);
     });
     image
 }
@@ -129,17 +186,17 @@ fn row_over_black(view: &color::View, encoding: Encoding, alpha: PictureAlpha, r
         row.iter_mut().for_each(|pixel| *pixel = over_black(view, encoding, alpha, *pixel));
         return;
     }
-    // The inverse of the view takes longest, and is vectorized over the row.
-    for pixel in row.iter_mut() {
-        let [r, g, b, coverage] = *pixel;
-        let coverage = match alpha {
-            PictureAlpha::Opaque => 1.0,
-            PictureAlpha::Straight(_) => coverage_of_encoded_alpha([r, g, b], coverage.clamp(0.0, 1.0)),
-            PictureAlpha::Associated => coverage.clamp(0.0, 1.0),
-        };
-        *pixel = [decoded(r), decoded(g), decoded(b), coverage];
+    match alpha {
+        PictureAlpha::Opaque => row.iter_mut().for_each(|pixel| pixel[3] = 1.0),
+        PictureAlpha::Straight(_) => {
+            for [r, g, b, coverage] in row.iter_mut() {
+                *coverage = coverage_of_encoded_alpha([*r, *g, *b], coverage.clamp(0.0, 1.0));
+            }
+        }
+        PictureAlpha::Associated => row.iter_mut().for_each(|pixel| pixel[3] = pixel[3].clamp(0.0, 1.0)),
     }
-    view.to_scene_row(simd::level(), row);
+    // The inverse of the view takes longest, and is vectorized over the row.
+    view.encoded_to_scene_row(simd::level(), row);
 }
 
 /// Exposed ACEScg of a pixel over black, and its coverage, from values multiplied by alpha.
@@ -259,8 +316,29 @@ mod tests {
     }
 
     #[test]
+    fn boxes_of_a_plate_that_is_decoded_for_the_picture_are_those_of_the_plate_alone() {
+        // Boxes of 2 x 2 pixels, but for the last column and row.
+        let (width, height) = (401, 37);
+        let code = |index: usize, c: usize| ((index * 7 + c * 89) % 256) as f32 / 255.0;
+        let pixels = (0..width * height).map(|index| [0, 1, 2, 3].map(|c| code(index, c))).collect();
+        let picture = Picture::opaque(Image::from_pixels(width, height, pixels).unwrap(), Encoding::DisplaySrgb);
+        let view = color::View::DISPLAY;
+        for alpha in [
+            PictureAlpha::Opaque,
+            PictureAlpha::Associated,
+            PictureAlpha::Straight(AlphaConvention::Encoded),
+            PictureAlpha::Straight(AlphaConvention::Linear),
+        ] {
+            let empty = Image::filled(width, height, [0.0; 4]);
+            let (color, boxes) = decode_with_boxes(&view, &picture, alpha, empty.clone());
+            let is_same = boxes == PlateBoxes::new(&picture, alpha, &view);
+            assert_eq!(is_same, plate_boxes::is_drawn_light(&picture, alpha), "{alpha:?}");
+            assert_eq!(color, decode(&view, &picture, alpha, empty), "{alpha:?}");
+        }
+    }
+
+    #[test]
     fn the_light_of_a_plate_is_what_is_drawn_of_it_whatever_its_alpha() {
-        use crate::plate_boxes::PlateBoxes;
         let view = color::View::DISPLAY;
         for encoding in [Encoding::DisplaySrgb, Encoding::LinearSrgb, Encoding::LinearAcescg] {
             for alpha in [

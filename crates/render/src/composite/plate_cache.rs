@@ -78,7 +78,10 @@ impl PlateCache {
         {
             return Ok(frame.clone());
         }
-        let frame = Arc::new(plate::load(plan, compiled.assets().as_ref(), number, &key.camera)?);
+        // A plate that nothing else refers to gives its memory to the next one.
+        let recycled = self.last.take().and_then(|(_, frame)| Arc::into_inner(frame));
+        let frame = plate::load(plan, compiled, number, &key.camera, digests[0], recycled.unwrap_or_default())?;
+        let frame = Arc::new(frame);
         self.last = Some((key, frame.clone()));
         Ok(frame)
     }

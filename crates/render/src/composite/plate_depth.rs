@@ -11,7 +11,7 @@ use bansho_base::{
 };
 use bansho_scene::{DepthKind, DepthScale, PlateDepth};
 
-use super::plate_mapping::{PlateMapping, depth_of_lens};
+use super::plate_mapping::{PlateMapping, depth_of_lens, image_in};
 
 /// The value that is nearest to the middle of a pixel, along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,8 +73,27 @@ fn slope([before, after]: [f64; 2], here: f64) -> f64 {
     }
 }
 
-/// The depth of a plate in the pixels of the picture; infinite outside the plate.
-pub(super) fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &PlateMapping) -> Image<1> {
+/// Values of a depth in meters.
+fn meters_of_row(scale: &DepthScale, values: &[f32], meters: &mut [f32]) {
+    if scale.meters == 1.0 && scale.kind != DepthKind::Inverse {
+        // They are in meters already: what is left of `meters_of` is vectorized.
+        for (meters, value) in meters.iter_mut().zip(values) {
+            *meters = if *value > 0.0 { *value } else { f32::INFINITY };
+        }
+        return;
+    }
+    for (meters, value) in meters.iter_mut().zip(values) {
+        *meters = scale.meters_of(*value) as f32;
+    }
+}
+
+/// The depth of a plate in the pixels of the picture; infinite outside the plate. The memory of `recycled` may be used again.
+pub(super) fn resample_depth(
+    camera: &Camera,
+    depth: &PlateDepth,
+    mapping: &PlateMapping,
+    recycled: Option<Image<1>>,
+) -> Image<1> {
     let rows = DepthRows { values: depth.values(), size: depth.size, scale: depth.scale };
     let nearest = |axis: usize, pixel: usize| {
         let per_plate_pixel = depth.size[axis] as f64 / mapping.plate[axis] as f64;
@@ -82,17 +101,15 @@ pub(super) fn resample_depth(camera: &Camera, depth: &PlateDepth, mapping: &Plat
     };
     let covered = mapping.covered_columns();
     let columns: Vec<NearestValue> = covered.clone().map(|x| nearest(0, x)).collect();
-    let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [f32::INFINITY]);
     // The depth of a pixel is then that of its value, whatever the direction of the pixel.
     let is_axis = camera.lens != Lens::Perspective || depth.scale.kind != DepthKind::Distance;
     if is_axis && mapping.is_identity() && depth.size == mapping.plate {
+        let mut image = image_in(recycled, depth.size, [0.0]);
         let both = image.pixels_mut().par_chunks_mut(depth.size[0]).zip(rows.values.par_chunks(depth.size[0]));
-        both.for_each(|(pixels, values)| {
-            let both = pixels.iter_mut().zip(values);
-            both.for_each(|(pixel, value)| pixel[0] = depth.scale.meters_of(*value) as f32);
-        });
+        both.for_each(|(pixels, values)| meters_of_row(&depth.scale, values, pixels.as_flattened_mut()));
         return image;
     }
+    let mut image = Image::filled(mapping.picture[0], mapping.picture[1], [f32::INFINITY]);
     image.pixels_mut().par_chunks_mut(mapping.picture[0]).enumerate().for_each(|(y, pixels)| {
         if !mapping.covers(1, y) {
             return;
@@ -142,6 +159,19 @@ mod tests {
             farthest_off = farthest_off.max((rows.meters(nearest, nearest) / water(position) - 1.0).abs());
         }
         assert!(farthest_off > 0.03, "the nearest value alone is off by {farthest_off}");
+    }
+
+    #[test]
+    fn values_in_meters_are_converted_as_any_others() {
+        let values = [3.5, 0.0, -0.0, -2.0, 1e-40, f32::MAX, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+        for (kind, meters) in
+            [(DepthKind::Axis, 1.0), (DepthKind::Distance, 1.0), (DepthKind::Axis, 0.5), (DepthKind::Inverse, 1.0)]
+        {
+            let scale = DepthScale { kind, meters, shift: 0.0 };
+            let mut converted = [0.0; 9];
+            meters_of_row(&scale, &values, &mut converted);
+            assert_eq!(converted, values.map(|value| scale.meters_of(value) as f32), "{kind:?} {meters}");
+        }
     }
 
     #[test]

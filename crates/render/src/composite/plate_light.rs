@@ -3,7 +3,7 @@
 use bansho_base::{
     camera::Camera,
     color,
-    host::plural::counted,
+    host::{parallel::prelude::*, plural::counted},
     math::{self, DVec2},
     world::sky::{ElevationProfile, ElevationSample},
 };
@@ -19,14 +19,14 @@ pub(crate) fn plate_light(compiled: &CompiledScene, plan: &Plan) -> Option<Eleva
     let boxes = compiled.plate_boxes(plan.view_transform())?;
     let camera = plan.camera.at(0.0, plan.size);
     let mapping = PlateMapping::new(plan, boxes.size());
-    let samples: Vec<_> = boxes
-        .iter()
-        .filter_map(|each| {
-            let [x, y] = [0, 1].map(|axis| mapping.picture_position(axis, each.center[axis]));
-            let sample = sample(&camera, DVec2::new(x, y), each.light)?;
-            Some(ElevationSample { weight: sample.weight * each.pixels as f64 / boxes.pixels_in_box(), ..sample })
-        })
-        .collect();
+    let of_boxes = (0..boxes.len()).into_par_iter().map(|index| {
+        let each = boxes.at(index);
+        let [x, y] = [0, 1].map(|axis| mapping.picture_position(axis, each.center[axis]));
+        let sample = sample(&camera, DVec2::new(x, y), each.light)?;
+        Some(ElevationSample { weight: sample.weight * each.pixels as f64 / boxes.pixels_in_box(), ..sample })
+    });
+    let of_boxes: Vec<Option<ElevationSample>> = of_boxes.collect();
+    let samples: Vec<ElevationSample> = of_boxes.into_iter().flatten().collect();
     let above = open_sky(&samples);
     ElevationProfile::from_samples(samples.into_iter().chain(above))
 }
@@ -55,9 +55,7 @@ const INFERRED_WEIGHT: f64 = 1e-6;
 /// The sky above the field of view of a plate, which is assumed to be open since rain falls from it: as bright as the brightest pixels in the
 /// upper half of the plate, and brighter toward the zenith as the overcast sky of CIE S 011.
 fn open_sky(samples: &[ElevationSample]) -> Vec<ElevationSample> {
-    let mut upper: Vec<&ElevationSample> = samples[..samples.len().div_ceil(2)].iter().collect();
-    upper.sort_by(|a, b| color::luminance(b.radiance).total_cmp(&color::luminance(a.radiance)));
-    upper.truncate((upper.len() as f64 * SKY_FRACTION).ceil() as usize);
+    let upper = brightest(&samples[..samples.len().div_ceil(2)], SKY_FRACTION);
     if upper.is_empty() {
         return Vec::new();
     }
@@ -72,6 +70,20 @@ fn open_sky(samples: &[ElevationSample]) -> Vec<ElevationSample> {
         inferred.push(ElevationSample { sine, weight: INFERRED_WEIGHT, radiance });
     }
     inferred
+}
+
+/// The fraction of the samples that are brightest, from the brightest; of equal ones the first.
+fn brightest(samples: &[ElevationSample], fraction: f64) -> Vec<&ElevationSample> {
+    let luminances = samples.iter().map(|sample| color::luminance(sample.radiance));
+    let mut order: Vec<(f32, usize)> = luminances.zip(0..).collect();
+    let count = (samples.len() as f64 * fraction).ceil() as usize;
+    let from_brightest = |a: &(f32, usize), b: &(f32, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    if count < order.len() {
+        order.select_nth_unstable_by(count, from_brightest);
+        order.truncate(count);
+    }
+    order.sort_unstable_by(from_brightest);
+    order.iter().map(|&(_, index)| &samples[index]).collect()
 }
 
 /// Radiance of the CIE Standard Overcast Sky (CIE S 011, sky 16) at the sine of an elevation, relative to the horizon: `1 + 2 sin`.
@@ -116,6 +128,24 @@ mod tests {
             bansho_base::world::sky::Sky::measured(profile).radiance(bansho_base::math::DVec3::new(0.0, 0.29, 0.0));
         assert!(seen[0] < 0.45, "{seen:?}");
         assert_eq!(open_sky(&[]), []);
+    }
+
+    #[test]
+    fn the_brightest_samples_come_first_and_equal_ones_in_their_order() {
+        let values = [3.0_f32, 5.0, 1.0, 5.0, 4.0, 2.0, 5.0, 4.0, 0.0, 4.0];
+        let of =
+            |(index, value): (usize, &f32)| ElevationSample { sine: index as f64, weight: 1.0, radiance: [*value; 3] };
+        let samples: Vec<_> = values.iter().enumerate().map(of).collect();
+        for (fraction, expected) in [
+            (0.0, &[][..]),
+            (0.2, &[1.0, 3.0]),
+            (0.45, &[1.0, 3.0, 6.0, 4.0, 7.0]),
+            (1.0, &[1.0, 3.0, 6.0, 4.0, 7.0, 9.0, 0.0, 5.0, 2.0, 8.0]),
+        ] {
+            let order: Vec<f64> = brightest(&samples, fraction).iter().map(|sample| sample.sine).collect();
+            assert_eq!(order, expected);
+        }
+        assert!(brightest(&[], 0.1).is_empty());
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use bansho_base::{
     camera::{Camera, Lens},
+    image::Image,
     math::DVec2,
 };
 use bansho_scene::DepthKind;
@@ -83,6 +84,12 @@ pub(super) fn filter_taps(mapping: &PlateMapping, axis: usize, pixel: usize) -> 
     let total: f32 = taps.iter().map(|tap| tap.weight).sum();
     taps.iter_mut().for_each(|tap| tap.weight /= total);
     taps
+}
+
+/// An image of this size, in the memory of an earlier one if that is as large, which then keeps its values; else with every pixel set to `value`.
+pub(super) fn image_in<const N: usize>(memory: Option<Image<N>>, size: [usize; 2], value: [f32; N]) -> Image<N> {
+    let equal = memory.filter(|image| [image.width(), image.height()] == size);
+    equal.unwrap_or_else(|| Image::filled(size[0], size[1], value))
 }
 
 /// Depth in the convention of the camera's lens: along the axis for perspective, else the distance.

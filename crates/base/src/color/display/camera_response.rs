@@ -9,7 +9,13 @@
 //!
 //! Both steps have an inverse, so that every display color is the response to some light. That of saturated colors has negative components, which are kept.
 
-use super::{gamut::sanitized, row::DisplayTransform, transfer::clamp_components};
+use std::sync::LazyLock;
+
+use super::{
+    gamut::sanitized,
+    row::{ChannelInverse, DisplayTransform},
+    transfer::{clamp_components, clamp_unit, decode_srgb8},
+};
 use crate::{
     color::space::{Matrix3, SRGB_FROM_ACESCG, apply_single},
     math::{MulAdd, approximations},
@@ -47,8 +53,9 @@ fn response(light: f32) -> f32 {
     // The lower bound keeps the logarithm finite: its response is 0 in single precision.
     let bounded = if light > 1e-12 { light } else { 1e-12 };
     let bounded = if bounded < WHITE { bounded } else { WHITE };
-    let u = approximations::exp2(CONTRAST * approximations::log2(SENSITIVITY * bounded));
-    (1.0 - approximations::exp2(-LOG2_E * u)) * (1.0 / RESPONSE_TO_WHITE)
+    // Between 1e-14 and 15: both powers of 2 are far from the ends of the range of floats.
+    let u = approximations::exp2_in_range(CONTRAST * approximations::log2_of_normal(SENSITIVITY * bounded));
+    (1.0 - approximations::exp2_in_range(-LOG2_E * u)) * (1.0 / RESPONSE_TO_WHITE)
 }
 
 /// The light of a channel that is shown as `display`, 0 to 1.
@@ -72,10 +79,25 @@ impl DisplayTransform for CameraResponse {
     #[inline(always)]
     fn acescg_from_display(&self, display: [f32; 3]) -> [f32; 3] {
         let [r, g, b] = clamp_components(display);
-        apply_single(
-            &const { MIXED_FROM_SRGB.times(&SRGB_FROM_ACESCG).inverse().single() },
-            [inverse_response(r), inverse_response(g), inverse_response(b)],
-        )
+        self.acescg_from_channels([inverse_response(r), inverse_response(g), inverse_response(b)])
+    }
+}
+
+impl ChannelInverse for CameraResponse {
+    fn channels_of_codes(&self) -> &'static [f32; 256] {
+        static CHANNELS: LazyLock<[f32; 256]> = LazyLock::new(|| {
+            let mut channels = [0.0; 256];
+            for (code, channel) in (0..=255).zip(&mut channels) {
+                *channel = inverse_response(clamp_unit(decode_srgb8(code)));
+            }
+            channels
+        });
+        &CHANNELS
+    }
+
+    #[inline(always)]
+    fn acescg_from_channels(&self, channels: [f32; 3]) -> [f32; 3] {
+        apply_single(&const { MIXED_FROM_SRGB.times(&SRGB_FROM_ACESCG).inverse().single() }, channels)
     }
 }
 

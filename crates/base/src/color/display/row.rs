@@ -9,9 +9,9 @@ use super::{
         premultiplied_linear_codes,
     },
     tone::ToneCurve,
-    transfer::clamp_components,
+    transfer::{clamp_components, clamp_unit, decode_srgb_code_or_value},
 };
-use crate::color::space::acescg_from_srgb;
+use crate::{color::space::acescg_from_srgb, math::approximations};
 
 /// Pixels processed together: a whole number of vectors at any width.
 const BLOCK: usize = 32;
@@ -32,6 +32,15 @@ pub(super) trait DisplayTransform {
 
     /// The exposed ACEScg that is shown as linear sRGB, which is clamped to 0..=1.
     fn acescg_from_display(&self, display: [f32; 3]) -> [f32; 3];
+}
+
+/// A transform whose inverse is a function of each channel, and then a mixture of the channels. The channels of 8-bit codes are in a table.
+pub(super) trait ChannelInverse: DisplayTransform {
+    /// The channels of the light of all sRGB codes.
+    fn channels_of_codes(&self) -> &'static [f32; 256];
+
+    /// The exposed ACEScg of channels.
+    fn acescg_from_channels(&self, channels: [f32; 3]) -> [f32; 3];
 }
 
 /// The largest component by a tone curve, with saturation and hue of the view `neutral`.
@@ -275,6 +284,56 @@ pub(super) fn to_scene<V: DisplayTransform>(view: &V, pixels: &mut [[f32; 4]]) {
         for (i, pixel) in pixels.iter_mut().enumerate() {
             (pixel[0], pixel[1], pixel[2]) = (scene[0][i], scene[1][i], scene[2][i]);
         }
+    }
+}
+
+/// sRGB-encoded values to exposed ACEScg by the inverse of a transform, in place; the fourth component is unchanged.
+#[inline(always)]
+pub(super) fn encoded_to_scene<V: ChannelInverse>(view: &V, pixels: &mut [[f32; 4]]) {
+    let channels_of_codes = view.channels_of_codes();
+    for pixels in pixels.chunks_mut(BLOCK) {
+        let mut block = [[0.0; 4]; BLOCK];
+        block[..pixels.len()].copy_from_slice(pixels);
+        let (channels, are_codes) = channels_of_block(channels_of_codes, &to_planes(&block));
+        let mut scene = [[0.0; BLOCK]; 4];
+        if are_codes {
+            for i in 0..BLOCK {
+                let rgb = view.acescg_from_channels([channels[0][i], channels[1][i], channels[2][i]]);
+                (scene[0][i], scene[1][i], scene[2][i]) = (rgb[0], rgb[1], rgb[2]);
+            }
+        } else {
+            decode(&mut block);
+            scene = block_to_scene(view, &to_planes(&block));
+        }
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            (pixel[0], pixel[1], pixel[2]) = (scene[0][i], scene[1][i], scene[2][i]);
+        }
+    }
+}
+
+/// The channels of the codes that are nearest to values, and whether all values are those of codes.
+#[inline(always)]
+fn channels_of_block(channels_of_codes: &[f32; 256], values: &Planes) -> (Planes, bool) {
+    let (mut channels, mut are_codes) = ([[0.0; BLOCK]; 4], true);
+    for c in 0..3 {
+        let mut codes = [0_i32; BLOCK];
+        for i in 0..BLOCK {
+            codes[i] = approximations::round_to_i32(clamp_unit(values[c][i]) * 255.0);
+            are_codes &= codes[i] as f32 / 255.0 == values[c][i];
+        }
+        for i in 0..BLOCK {
+            // Within the table, so that no bounds are checked.
+            channels[c][i] = channels_of_codes[(codes[i] & 0xff) as usize];
+        }
+    }
+    (channels, are_codes)
+}
+
+/// sRGB-encoded values to linear sRGB, in place; the fourth component is unchanged. Not inlined: it calls scalar functions.
+#[inline(never)]
+pub(super) fn decode(pixels: &mut [[f32; 4]]) {
+    for [r, g, b, _] in pixels {
+        (*r, *g, *b) = (decode_srgb_code_or_value(*r), decode_srgb_code_or_value(*g), decode_srgb_code_or_value(*b));
     }
 }
 

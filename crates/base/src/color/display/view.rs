@@ -153,10 +153,26 @@ impl View {
             Transform::Agx => dispatch!(level, _simd => row::to_scene(&Agx, pixels)),
             Transform::Raw => dispatch!(level, _simd => row::to_scene(&Clamped, pixels)),
         }
-        if let Some(balance) = &self.balance {
-            for pixel in pixels {
-                [pixel[0], pixel[1], pixel[2]] = balance.invert([pixel[0], pixel[1], pixel[2]]);
-            }
+        self.invert_balance(pixels);
+    }
+
+    /// [`to_scene`](Self::to_scene) for many sRGB-encoded values in place, exposed ACEScg out; the fourth component is unchanged. Values of 8-bit codes are
+    /// converted by tables.
+    pub fn encoded_to_scene_row(&self, level: Level, pixels: &mut [[f32; 4]]) {
+        if self.transform != Transform::CameraResponse {
+            row::decode(pixels);
+            self.to_scene_row(level, pixels);
+            return;
+        }
+        dispatch!(level, _simd => row::encoded_to_scene(&CameraResponse, pixels));
+        self.invert_balance(pixels);
+    }
+
+    /// Removes the white balance from many pixels.
+    fn invert_balance(&self, pixels: &mut [[f32; 4]]) {
+        let Some(balance) = &self.balance else { return };
+        for pixel in pixels {
+            [pixel[0], pixel[1], pixel[2]] = balance.invert([pixel[0], pixel[1], pixel[2]]);
         }
     }
 
@@ -273,6 +289,25 @@ mod tests {
             _ => ((seed >> 8) as f32 / 16_777_216.0 - 0.2) * libm::exp2f((seed % 31) as f32 - 12.0),
         };
         (0..count).map(|i| [0, 1, 2, 3].map(|c| component(scattered(4 * i + c)))).collect()
+    }
+
+    #[test]
+    fn encoded_rows_have_the_bits_of_decoded_pixels_at_every_vector_level() {
+        // Codes of 8 bits, which are read from tables, then values between them, beyond them, and not finite.
+        let codes = (0..300_u32).map(|i| [0, 1, 2, 3].map(|c| (scattered(4 * i + c) % 256) as f32 / 255.0));
+        let between = (0..100_u32).map(|i| [0, 1, 2, 3].map(|c| scattered(4 * i + c) as f32 / u32::MAX as f32));
+        let pixels: Vec<[f32; 4]> = codes.chain(between).chain(wild_pixels(100)).collect();
+        for view in all_views().chain([View::DISPLAY.with_white_balance(Some(3200.0))]) {
+            for level in simd::available_levels() {
+                let mut row = pixels.clone();
+                view.encoded_to_scene_row(level, &mut row);
+                for (converted, [r, g, b, alpha]) in row.iter().zip(&pixels) {
+                    let [red, green, blue] = view.to_scene([*r, *g, *b].map(crate::color::decode_srgb));
+                    let expected = [red, green, blue, *alpha];
+                    assert_eq!(converted.map(f32::to_bits), expected.map(f32::to_bits), "{view:?} {level:?}");
+                }
+            }
+        }
     }
 
     #[test]
