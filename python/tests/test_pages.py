@@ -24,6 +24,20 @@ PAGES = ("python.md", "python-datasets.md", "python-arrays.md")
 def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     (tmp_path / "scenes").symlink_to(GUIDE.parents[2] / "scenes", target_is_directory=True)
     monkeypatch.chdir(tmp_path)
+    run_blocks(page, tmp_path)
+
+
+def test_the_quick_start_needs_no_checkout(program, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    commands = re.findall(r"^python -m bansho (new [^#\n]+)", (GUIDE / "python.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(commands) == 2
+    for command in commands:
+        subprocess.run([*program, *command.split()], check=True, capture_output=True)
+    run_blocks("python.md", tmp_path)
+
+
+def run_blocks(page, tmp_path):
+    """Runs the code of a page, one block after the other, in the working folder `tmp_path`."""
     blocks = re.findall(r"^```python\n(.*?)^```$", (GUIDE / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     assert blocks
     namespace = {"__name__": "page"}
