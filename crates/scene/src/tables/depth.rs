@@ -75,21 +75,22 @@ impl DepthValues {
     };
 
     fn of_chunk(values: &[f32]) -> Self {
-        let (mut positive, mut negative, mut zero, mut infinite) = (0_u32, 0_u32, 0_u32, 0_u32);
-        let mut range = Self::NONE.range;
-        // Without branches, so that it is vectorized.
-        for &value in values {
-            let is_counted = value.is_finite() & (value != 0.0);
-            positive += u32::from(is_counted & (value > 0.0));
-            negative += u32::from(is_counted & (value < 0.0));
-            zero += u32::from(value == 0.0);
-            infinite += u32::from(value.is_infinite());
-            let [low, high] = if is_counted { [value; 2] } else { Self::NONE.range };
-            range[0] = if low < range[0] { low } else { range[0] };
-            range[1] = if high > range[1] { high } else { range[1] };
+        let mut counts = LaneCounts::NONE;
+        let (batches, rest) = values.as_chunks::<LANES>();
+        for batch in batches {
+            for lane in 0..LANES {
+                counts.add(lane, batch[lane]);
+            }
         }
-        let [positive, negative, zero, infinite] = [positive, negative, zero, infinite].map(|count| count as usize);
+        for (lane, value) in rest.iter().enumerate() {
+            counts.add(lane, *value);
+        }
+        let LaneCounts { positive, negative, zero, infinite, low, high } = counts;
+        let [positive, negative, zero, infinite] =
+            [positive, negative, zero, infinite].map(|lanes| lanes.iter().sum::<u32>() as usize);
         let not_a_number = values.len() - positive - negative - zero - infinite;
+        let [lowest, highest] = Self::NONE.range;
+        let range = [low.into_iter().fold(lowest, f32::min), high.into_iter().fold(highest, f32::max)];
         Self { positive, negative, zero, infinite, not_a_number, range }
     }
 
@@ -115,6 +116,46 @@ impl DepthValues {
             }
             _ => None,
         }
+    }
+}
+
+/// Lanes in which values are counted: the six numbers of each fit in the narrowest vector registers.
+const LANES: usize = 4;
+
+/// Counts in lanes, which the compiler keeps in vectors.
+struct LaneCounts {
+    positive: [u32; LANES],
+    negative: [u32; LANES],
+    zero: [u32; LANES],
+    infinite: [u32; LANES],
+    /// Smallest and largest of the values that are finite and not 0.
+    low: [f32; LANES],
+    high: [f32; LANES],
+}
+
+impl LaneCounts {
+    const NONE: Self = Self {
+        positive: [0; LANES],
+        negative: [0; LANES],
+        zero: [0; LANES],
+        infinite: [0; LANES],
+        low: [f32::INFINITY; LANES],
+        high: [f32::NEG_INFINITY; LANES],
+    };
+
+    /// Counts a value, without branches.
+    #[inline(always)]
+    fn add(&mut self, lane: usize, value: f32) {
+        let is_finite = value.abs() < f32::INFINITY;
+        self.positive[lane] += u32::from(is_finite & (value > 0.0));
+        self.negative[lane] += u32::from(is_finite & (value < 0.0));
+        self.zero[lane] += u32::from(value == 0.0);
+        self.infinite[lane] += u32::from(value.abs() == f32::INFINITY);
+        let is_counted = is_finite & (value != 0.0);
+        let low = if is_counted { value } else { f32::INFINITY };
+        let high = if is_counted { value } else { f32::NEG_INFINITY };
+        self.low[lane] = if low < self.low[lane] { low } else { self.low[lane] };
+        self.high[lane] = if high > self.high[lane] { high } else { self.high[lane] };
     }
 }
 
