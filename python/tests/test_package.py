@@ -1,8 +1,16 @@
 """What the installed package has besides its modules."""
 
+import subprocess
+import sys
 from importlib.metadata import PackageNotFoundError, distribution
 
 import pytest
+
+
+def test_the_program_runs_as_a_module_without_a_warning(program):
+    done = subprocess.run([sys.executable, "-W", "error", "-m", "bansho", "--version"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("bansho ")
 
 
 def test_the_notices_have_the_crates_of_the_extension_and_of_the_program():

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import physics
-from .__main__ import program
+from ._program import program
 from .scene import Scene
 
 __all__ = ["black_body", "columns", "deposition", "drop_sizes", "emission", "quenching", "streak_opacity", "terminal_velocity"]
