@@ -77,6 +77,20 @@ impl ArrayAssets {
         self.stores.write().unwrap_or_else(PoisonError::into_inner).pictures.insert(name.to_owned(), stored);
     }
 
+    /// Takes away the pictures of `name`. Returns the memory of the first, if nothing else refers to it.
+    pub(crate) fn take_picture_memory(&self, name: &str) -> Vec<[f32; 4]> {
+        let stored = self.stores.write().unwrap_or_else(PoisonError::into_inner).pictures.remove(name);
+        let first = stored.and_then(|stored| Arc::into_inner(stored.into_iter().next()?.content));
+        first.map_or_else(Vec::new, |picture| picture.color.into_pixels())
+    }
+
+    /// Takes away the depths of `name`. Returns the memory of the first, if nothing else refers to it.
+    pub(crate) fn take_depth_memory(&self, name: &str) -> Vec<[f32; 1]> {
+        let stored = self.stores.write().unwrap_or_else(PoisonError::into_inner).depths.remove(name);
+        let first = stored.and_then(|stored| Arc::into_inner(stored.into_iter().next()?.content));
+        first.map_or_else(Vec::new, |depth| depth.values.into_pixels())
+    }
+
     /// Stores the depths of `name` in place of all before: one, or one for each frame.
     pub(crate) fn set_depths(&self, name: &str, depths: Vec<DepthMap>) {
         let stored = depths.into_iter().map(Stored::new).collect();
@@ -167,13 +181,16 @@ pub(crate) fn codes_of<'a>(codes: &'a PyReadonlyArray3<u8>) -> PyResult<(Shape, 
     Ok((checked_shape(codes.shape())?, contiguous(codes.as_slice())?))
 }
 
-/// A picture of sRGB codes in rows, in the pool of the caller; alpha is straight and blends encoded values.
-pub(crate) fn picture_of_codes((shape, codes): (Shape, &[u8])) -> PyResult<Picture> {
-    picture(shape, pixels_of_codes(shape, codes), Encoding::DisplaySrgb)
+/// A picture of sRGB codes in rows, in the pool of the caller and in the memory of an earlier one; alpha is straight and blends encoded values.
+pub(crate) fn picture_of_codes((shape, codes): (Shape, &[u8]), memory: Vec<[f32; 4]>) -> PyResult<Picture> {
+    picture(shape, pixels_of_codes(shape, codes, memory), Encoding::DisplaySrgb)
 }
 
-/// Encoded values of 0 to 1 of codes, in the pool of the caller.
-fn pixels_of_codes(shape: Shape, codes: &[u8]) -> Vec<[f32; 4]> {
+/// Pixels that a task converts.
+const TASK_PIXELS: usize = 1 << 13;
+
+/// Encoded values of 0 to 1 of codes, in the pool of the caller and in the memory of earlier ones.
+fn pixels_of_codes(shape: Shape, codes: &[u8], memory: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
     /// The values of the codes.
     const VALUES: [f32; 256] = {
         let mut values = [0.0; 256];
@@ -184,15 +201,27 @@ fn pixels_of_codes(shape: Shape, codes: &[u8]) -> Vec<[f32; 4]> {
         }
         values
     };
-    match shape.channels {
+    let mut pixels = resized(memory, shape.height * shape.width, [0.0; 4]);
+    let tasks = pixels.par_chunks_mut(TASK_PIXELS).zip(codes.par_chunks(TASK_PIXELS * shape.channels));
+    tasks.for_each(|(pixels, codes)| match shape.channels {
         3 => {
-            let pixels = codes.as_chunks::<3>().0.par_iter();
-            pixels
-                .map(|&[r, g, b]| [VALUES[usize::from(r)], VALUES[usize::from(g)], VALUES[usize::from(b)], 1.0])
-                .collect()
+            for (pixel, &[r, g, b]) in pixels.iter_mut().zip(codes.as_chunks::<3>().0) {
+                *pixel = [VALUES[usize::from(r)], VALUES[usize::from(g)], VALUES[usize::from(b)], 1.0];
+            }
         }
-        _ => codes.as_chunks::<4>().0.par_iter().map(|rgba| rgba.map(|code| VALUES[usize::from(code)])).collect(),
-    }
+        _ => {
+            for (pixel, rgba) in pixels.iter_mut().zip(codes.as_chunks::<4>().0) {
+                *pixel = rgba.map(|code| VALUES[usize::from(code)]);
+            }
+        }
+    });
+    pixels
+}
+
+/// `count` values, in the memory of others if there were as many, which then stay; else each is `value`.
+fn resized<T: Clone>(memory: Vec<T>, count: usize, value: T) -> Vec<T> {
+    // Memory that is new and zero is not written.
+    if memory.len() == count { memory } else { vec![value; count] }
 }
 
 /// A picture of floats, height x width x 3 or 4. Alpha of linear light is associated, else straight.
@@ -227,13 +256,22 @@ pub(crate) fn depths_of<'a>(depth: &'a PyReadonlyArray2<f32>) -> PyResult<([usiz
     Ok(([shape[1], shape[0]], contiguous(depth.as_slice())?))
 }
 
-/// A depth in rows, in the pool of the caller. Infinity and 0 are infinitely far away.
-pub(crate) fn depth_map(([width, height], values): ([usize; 2], &[f32])) -> PyResult<DepthMap> {
-    if let Some(unusable) = values.par_iter().find_first(|value| value.is_nan() || **value < 0.0) {
+/// A depth in rows, in the pool of the caller and in the memory of an earlier one. Infinity and 0 are infinitely far away.
+pub(crate) fn depth_map(([width, height], values): ([usize; 2], &[f32]), memory: Vec<[f32; 1]>) -> PyResult<DepthMap> {
+    let mut depths = resized(memory, values.len(), [0.0]);
+    let tasks = depths.par_chunks_mut(TASK_PIXELS).zip(values.par_chunks(TASK_PIXELS));
+    let is_usable = tasks.map(|(depths, values)| {
+        depths.as_flattened_mut().copy_from_slice(values);
+        // All of them, without a branch.
+        values.iter().fold(true, |all, value| all & (*value >= 0.0))
+    });
+    if !is_usable.reduce(|| true, |one, other| one & other)
+        && let Some(unusable) = values.iter().find(|value| value.is_nan() || **value < 0.0)
+    {
         let allowed = "0 or more, and infinity or 0 where the depth is unknown or infinite";
         return Err(error::value(format!("a depth with the value {unusable}; allowed: {allowed}")));
     }
-    let image = Image::from_pixels(width, height, values.par_iter().map(|&value| [value]).collect());
+    let image = Image::from_pixels(width, height, depths);
     let values = image.filter(|image| !image.pixels().is_empty());
     let values = values.ok_or_else(|| error::value("a depth without pixels".to_owned()))?;
     Ok(DepthMap { values, remarks: Vec::new() })
@@ -282,7 +320,9 @@ impl Arrays {
     /// Pictures of sRGB codes.
     fn set_codes(&self, py: Python<'_>, name: &str, frames: Vec<PyReadonlyArray3<u8>>) -> PyResult<()> {
         let frames = frames.iter().map(codes_of).collect::<PyResult<Vec<_>>>()?;
-        let pictures = work::run(py, 1, |_| frames.into_iter().map(picture_of_codes).collect::<PyResult<_>>())??;
+        let pictures = work::run(py, 1, |_| {
+            frames.into_iter().map(|codes| picture_of_codes(codes, Vec::new())).collect::<PyResult<_>>()
+        })??;
         self.assets.set_pictures(name, pictures);
         Ok(())
     }
@@ -303,7 +343,9 @@ impl Arrays {
     /// Depths.
     fn set_depths(&self, py: Python<'_>, name: &str, frames: Vec<PyReadonlyArray2<f32>>) -> PyResult<()> {
         let frames = frames.iter().map(depths_of).collect::<PyResult<Vec<_>>>()?;
-        let depths = work::run(py, 1, |_| frames.into_iter().map(depth_map).collect::<PyResult<_>>())??;
+        let depths = work::run(py, 1, |_| {
+            frames.into_iter().map(|depth| depth_map(depth, Vec::new())).collect::<PyResult<_>>()
+        })??;
         self.assets.set_depths(name, depths);
         Ok(())
     }

@@ -58,9 +58,10 @@ enum Source<'a> {
 }
 
 impl Source<'_> {
-    fn picture(self) -> PyResult<Picture> {
+    /// The picture, in the memory of an earlier one.
+    fn picture(self, memory: Vec<[f32; 4]>) -> PyResult<Picture> {
         match self {
-            Self::Codes(codes) => assets::picture_of_codes(codes),
+            Self::Codes(codes) => assets::picture_of_codes(codes, memory),
             Self::Picture(picture) => Ok(picture),
         }
     }
@@ -180,8 +181,10 @@ impl PlateShot {
         let depth = depth.as_ref().map(assets::depths_of).transpose()?;
         let frame = [number, i64::from(truth)];
         let drawn = self.state.run(py, self.threads, |state, observer| {
-            let image = image.picture().map_err(Failure::Exception)?;
-            let depth = depth.map(assets::depth_map).transpose().map_err(Failure::Exception)?;
+            // The last plate is not drawn again.
+            let (pixels, depths) = (state.assets.take_picture_memory(IMAGE), state.assets.take_depth_memory(DEPTH));
+            let image = image.picture(pixels).map_err(Failure::Exception)?;
+            let depth = depth.map(|depth| assets::depth_map(depth, depths)).transpose().map_err(Failure::Exception)?;
             let drawn = state.draw(scene, text, Plate { image, depth }, frame, observer)?;
             Ok::<Converted, Failure>(Converted::of(drawn))
         })??;
@@ -202,11 +205,9 @@ impl Converted {
         match drawn {
             Drawn::Codes(image, truth) => {
                 let codes = match image.pixels {
-                    DisplayPixels::Eight(codes) => codes.into_par_iter().map(|[r, g, b, _]| [r, g, b]).collect(),
+                    DisplayPixels::Eight(codes) => without_alpha(&codes, |code| code),
                     // Eight bits are asked for.
-                    DisplayPixels::Sixteen(codes) => {
-                        codes.into_par_iter().map(|[r, g, b, _]| [r, g, b].map(|code| (code >> 8) as u8)).collect()
-                    }
+                    DisplayPixels::Sixteen(codes) => without_alpha(&codes, |code| (code >> 8) as u8),
                 };
                 Self { size: [image.height, image.width], codes: Some(codes), light: None, truth }
             }
@@ -231,4 +232,17 @@ impl Converted {
         };
         Ok((picture, truth))
     }
+}
+
+/// Red, green and blue of codes, as codes of 8 bits.
+fn without_alpha<T: Copy + Sync>(codes: &[[T; 4]], code_of: impl Fn(T) -> u8 + Sync) -> Vec<[u8; 3]> {
+    /// Pixels that a task copies.
+    const TASK_PIXELS: usize = 1 << 13;
+    let mut opaque = vec![[0; 3]; codes.len()];
+    opaque.par_chunks_mut(TASK_PIXELS).zip(codes.par_chunks(TASK_PIXELS)).for_each(|(opaque, codes)| {
+        for (pixel, &[r, g, b, _]) in opaque.iter_mut().zip(codes) {
+            *pixel = [code_of(r), code_of(g), code_of(b)];
+        }
+    });
+    opaque
 }
