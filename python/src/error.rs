@@ -96,12 +96,17 @@ fn allowed_of(kind: &ProblemKind) -> Option<String> {
 
 /// The exception for an invalid scene, whose text has lines.
 pub(crate) fn scene(error: &SceneError) -> PyErr {
+    scene_with_message(error, &error.to_string())
+}
+
+/// The exception for an invalid scene, with a message that may also name a frame.
+fn scene_with_message(error: &SceneError, message: &str) -> PyErr {
     let mut entries = Vec::with_capacity(error.problems.len());
     for problem in &error.problems {
         let position = problem.span.as_ref().map(|span| error.position(span.start));
         entries.push(ProblemEntry::new(problem, position.map(|position| [position.line, position.column])));
     }
-    scene_exception(&error.to_string(), entries)
+    scene_exception(message, entries)
 }
 
 /// The exception for parameters that a program has set.
@@ -166,7 +171,7 @@ pub(crate) fn effect(error: &EffectError) -> PyErr {
 /// The exception for a job that failed.
 pub(crate) fn job(error: &JobError) -> PyErr {
     match (error, error.scene(), error.category()) {
-        (_, Some(problems), _) => scene(problems),
+        (_, Some(problems), _) => scene_with_message(problems, &error.to_string()),
         (JobError::Edit { source, .. }, ..) => edit(source),
         (.., ErrorCategory::Cancelled) => PyKeyboardInterrupt::new_err(error.to_string()),
         (.., ErrorCategory::Usage) => value(error.to_string()),

@@ -90,7 +90,8 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
 pub(crate) fn print_job_error(error: &JobError) {
     match error.scene() {
         Some(scene) => {
-            scene.messages().for_each(|message| print_error_lines(&format!("error: {message}")));
+            let frame = error.frame().map(|number| format!("frame {number}: ")).unwrap_or_default();
+            scene.messages().for_each(|message| print_error_lines(&format!("error: {frame}{message}")));
             scene.omitted_message().iter().for_each(|message| print_error_lines(message));
             flags::hint_for_scene(scene).iter().for_each(|hint| print_message("hint", hint));
         }

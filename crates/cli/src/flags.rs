@@ -16,6 +16,7 @@ use bansho::{
 /// The message of an error.
 pub(crate) fn error_message(error: &JobError) -> String {
     match error {
+        JobError::Frame { number, source } => format!("frame {number}: {}", error_message(source)),
         JobError::Unreadable { path, source: InputError::Io(source), suggestion: None }
             if source.kind() == io::ErrorKind::NotFound =>
         {

@@ -129,17 +129,18 @@ fn join_frame(whole: &PreparedJob, number: i64, tiles: [usize; 2], paths: &[Path
     let sink = whole.open_sink(whole.output().clone(), 1, size)?;
     let slot = FrameSlot { index: 0, number };
     let fingerprint = whole.expected_fingerprint(number);
-    match whole.output().kind() {
+    let written = match whole.output().kind() {
         OutputKind::Exr => {
             let parts = read_tiles(paths, frame_file::read_exr)?;
             let frame = join_linear(whole, number, fingerprint, &rects, parts);
-            sink.write(slot, FinishedPicture::Linear(&frame))?;
+            sink.write(slot, FinishedPicture::Linear(&frame))
         }
         _ => {
             let parts = read_tiles(paths, frame_file::read_png)?;
-            sink.write(slot, FinishedPicture::Display(&join_display(size, &rects, parts), &fingerprint))?;
+            sink.write(slot, FinishedPicture::Display(&join_display(size, &rects, parts), &fingerprint))
         }
-    }
+    };
+    written.map_err(|error| JobError::from(error).in_frame(number))?;
     Ok(sink.finish()?)
 }
 

@@ -182,7 +182,8 @@ fn make_film(whole: &PreparedJob, path: &Path, observer: &dyn Observer) -> Resul
         observer::check(observer).map_err(|_| JobError::SingleFileCancelled { output: "a film" })?;
         let slot = FrameSlot { index, number };
         let picture = display_picture(whole, number, sink.picture_format(), observer)?;
-        sink.write(slot, FinishedPicture::Display(&picture, &[0; 32]))?;
+        sink.write(slot, FinishedPicture::Display(&picture, &[0; 32]))
+            .map_err(|error| JobError::from(error).in_frame(number))?;
     }
     Ok(sink.finish()?)
 }

@@ -12,6 +12,7 @@
 //! its references and its equations with the functions that implement them.
 
 pub mod particles;
+mod picture_bounds;
 pub mod sheet;
 pub mod sparks;
 pub mod volume;

@@ -49,8 +49,9 @@ impl Phenomenon for Rain {
     }
 
     fn memory_bytes(&self, pixels: f64) -> f64 {
-        // Measured: what is fixed, and the streaks, cells and tiles of the picture.
-        4e5 + 4.5 * pixels
+        // Measured: what is fixed; the streaks, cells and tiles of the picture; and the light that drops scatter before each tile, which is as much where
+        // there are lamps.
+        4e5 + 8.5 * pixels
     }
 
     /// Rain emits no light.

@@ -21,7 +21,10 @@ pub mod shot;
 pub mod target;
 
 pub use compiled::{BuildErrors, CompiledScene};
-pub use composite::{glare::source_window, moments::moment_bytes_per_thread, plate_lighting::lit_plate_bytes};
+pub use composite::{
+    composition::scratch_bytes_per_thread, glare::source_window, moments::moment_bytes_per_thread,
+    plate_lighting::lit_plate_bytes,
+};
 pub use pixels::{
     BufferLengthError, ChannelError, f16, nonzero_rect, write_channel32f, write_depth32f, write_rgba8, write_rgba16f,
     write_rgba32f,

@@ -207,8 +207,8 @@ pub trait Phenomenon: Send + Sync {
         1.7
     }
 
-    /// Memory of the phenomenon, a run of it and a prepared frame of `pixels` pixels, bytes, to a factor of one and a half: for the check before a job. What
-    /// [`shared_memory`](Self::shared_memory) tells is left out.
+    /// Memory of the phenomenon, a run of it and a prepared frame in which it covers `pixels` pixels, bytes, to a factor of one and a half: for the check before a
+    /// job. What [`shared_memory`](Self::shared_memory) tells is left out.
     fn memory_bytes(&self, _pixels: f64) -> f64 {
         0.0
     }
@@ -216,6 +216,11 @@ pub trait Phenomenon: Send + Sync {
     /// What it holds in memory together with other phenomena when a frame of `view` is prepared; counted once for each key.
     fn shared_memory(&self, _view: &View) -> Vec<SharedMemory> {
         Vec::new()
+    }
+
+    /// The part of the window of a view in which it is drawn, about, for estimates of memory; by default all of it.
+    fn picture_bounds(&self, view: &View) -> Rect {
+        view.window
     }
 
     /// A note for the user about how it will look among the other phenomena.

@@ -52,6 +52,7 @@ pub(crate) fn render(args: &RenderArgs) -> anyhow::Result<()> {
     run_job(&args.work, |reporter| {
         let job = args.job()?.prepare()?;
         reporter.set_estimated_memory(job.memory_bytes());
+        reporter.set_frames_in_flight(job.frames_in_flight());
         let summary = job.run(reporter)?;
         Ok(JobResult { unit: "frame", drawn: summary.drawn, kept: summary.kept, files: vec![summary.first_file] })
     })
@@ -62,6 +63,7 @@ pub(crate) fn flipbook(args: &FlipbookArgs) -> anyhow::Result<()> {
     run_job(&args.work, |reporter| {
         let flipbook = args.flipbook()?.prepare()?;
         let frames = flipbook.frame_count();
+        reporter.set_frames_in_flight(flipbook.frames_in_flight());
         let summary = flipbook.run(reporter)?;
         Ok(JobResult { unit: "frame", drawn: frames, kept: 0, files: summary.files })
     })

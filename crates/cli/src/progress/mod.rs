@@ -65,6 +65,11 @@ impl ProgressReporter {
         self.stats.iter().for_each(|stats| stats.set_estimated_memory(bytes));
     }
 
+    /// Tells how many frames the job draws at once, for the statistics.
+    pub(crate) fn set_frames_in_flight(&self, count: usize) {
+        self.stats.iter().for_each(|stats| stats.set_frames_in_flight(count));
+    }
+
     /// Reports the result, and the statistics of a job with `threads` threads.
     ///
     /// # Errors

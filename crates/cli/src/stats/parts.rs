@@ -24,6 +24,8 @@ struct Row {
     first: [f64; 3],
     /// Medians over the other frames, s.
     median: [f64; 3],
+    /// Sums over all frames, s.
+    sum: [f64; 3],
 }
 
 impl Row {
@@ -84,6 +86,32 @@ pub(super) fn json(times: &StageTimes) -> Value {
     .collect()
 }
 
+/// The table where frames overlap: means over all `frames`, since first and later ones cannot be told apart. It begins with a new line; empty if nothing was
+/// drawn.
+pub(super) fn table_of_means(times: &StageTimes, frames: usize) -> String {
+    let rows = rows(times);
+    if rows.is_empty() {
+        return String::new();
+    }
+    let mut table = format!("\n\n{:24} mean of {}", "processor ms", counted(frames, "frame"));
+    let _ = write!(table, "\n{:24} {:>9} {:>9} {:>9}", "", "advance", "prepare", "draw");
+    for row in &rows {
+        let [advance, prepare, draw] = row.sum.map(|seconds| 1e3 * seconds / frames.max(1) as f64);
+        let _ = write!(table, "\n{:24} {advance:9.2} {prepare:9.2} {draw:9.2}", row.label());
+    }
+    table
+}
+
+/// The same rows as an array.
+pub(super) fn json_of_means(times: &StageTimes, frames: usize) -> Value {
+    let rows = rows(times).into_iter();
+    rows.map(|row| {
+        let mean = row.sum.map(|seconds| seconds / frames.max(1) as f64);
+        json!({ "phenomenon": row.phenomenon, "mirrored": row.is_mirrored, "mean_ms": milliseconds(mean) })
+    })
+    .collect()
+}
+
 /// Times in the order of [`STAGES`], in ms, by the names of the stages.
 fn milliseconds(seconds: [f64; 3]) -> Value {
     let [advance, prepare, draw] = seconds.map(|seconds| 1e3 * seconds);
@@ -98,10 +126,11 @@ fn rows(times: &StageTimes) -> Vec<Row> {
         let Some(column) = STAGES.iter().position(|each| *each == stage) else { continue };
         let index = rows.iter().position(|row| (&row.phenomenon, row.is_mirrored) == (&phenomenon, is_mirrored));
         let index = index.unwrap_or_else(|| {
-            rows.push(Row { phenomenon, is_mirrored, first: [0.0; 3], median: [0.0; 3] });
+            rows.push(Row { phenomenon, is_mirrored, first: [0.0; 3], median: [0.0; 3], sum: [0.0; 3] });
             rows.len() - 1
         });
         [rows[index].first[column], rows[index].median[column]] = first_and_median(&frames);
+        rows[index].sum[column] = frames.iter().sum();
     }
     rows.sort_by_key(|row| (row.phenomenon.is_none(), row.is_mirrored));
     rows
@@ -167,6 +196,18 @@ mod tests {
         assert_eq!(row("rain, mirrored"), ["0.0", "4.00", "0.00", "0.00", "4.00", "0.00"]);
         assert_eq!(row("elapsed ms"), ["1.0", "20.00", "20.00", "1.00", "20.00", "20.00"]);
         assert!(table.contains("median of 3 other frames"), "{table}");
+    }
+
+    #[test]
+    fn where_frames_overlap_their_mean_is_told() {
+        // (9 + 1 + 2 + 3) / 4 and, in the mirror, 4 ms.
+        let rows = json_of_means(&times(), 4);
+        assert!((rows[0]["mean_ms"]["draw"].as_f64().unwrap() - 3.75).abs() < 1e-9, "{rows}");
+        assert!((rows[1]["mean_ms"]["prepare"].as_f64().unwrap() - 4.0).abs() < 1e-9, "{rows}");
+        let table = table_of_means(&times(), 4);
+        assert!(table.contains("mean of 4 frames") && !table.contains("first frame"), "{table}");
+        let rain = table.lines().find(|line| line.starts_with("rain ")).unwrap();
+        assert!(rain.ends_with("0.00      0.00      3.75"), "{table}");
     }
 
     #[test]

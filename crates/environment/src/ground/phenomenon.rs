@@ -7,7 +7,7 @@ use bansho_base::{
     host::observer::{Cancelled, Observer, check},
     math::{DVec2, DVec3},
     phenomenon::{
-        Phenomenon, PhenomenonInfo, Prepared, Run,
+        Phenomenon, PhenomenonInfo, Prepared, Run, SharedMemory,
         light_batch::RelativeLight,
         strip::{DepthInterval, PathCameras, Shutter, View, parts_of_motion},
         surroundings::{Backdrop, Occluder, Publication, Surroundings},
@@ -19,7 +19,7 @@ use super::{
     Ground, GroundKind, GroundParameters,
     hits::{HORIZON, RowDepths},
     lake,
-    row_cache::LightInputs,
+    row_cache::{self, LightInputs},
     sample::SampledImage,
     shade::PreparedGround,
 };
@@ -42,6 +42,14 @@ impl Phenomenon for Ground {
     /// The ground only reflects the light of others.
     fn luminance(&self) -> f64 {
         0.0
+    }
+
+    /// The rows that are kept from frame to frame, for all frames that are drawn at once.
+    fn shared_memory(&self, view: &View) -> Vec<SharedMemory> {
+        let camera_height = view.camera.position.y - self.parameters.height;
+        let (first, end) = RowDepths::new(view, camera_height).rows(&DepthInterval { near: 0.0, far: HORIZON });
+        let rows = end.min(view.window.bottom()).saturating_sub(first.max(view.window.y));
+        vec![SharedMemory { key: ("rows of the ground", 0), bytes: row_cache::estimated_bytes(view, rows) }]
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {

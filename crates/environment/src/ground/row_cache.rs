@@ -18,6 +18,16 @@ use super::surface::SurfaceSamples;
 /// Largest window whose rows are kept, pixels. A pixel takes 24 bytes of pattern or 16 bytes of light, so a view at most 100 MB.
 const MAX_CACHED_PIXELS: usize = 1 << 22;
 
+/// Bytes that are kept of `rows` rows of the window of a view: of a still camera the light, or the pattern where lights change.
+pub(super) fn estimated_bytes(view: &View, rows: usize) -> f64 {
+    /// The mean of pattern and light.
+    const BYTES: f64 = 20.0;
+    if view.window.width * view.window.height > MAX_CACHED_PIXELS || !view.path_cameras().is_still() {
+        return 0.0;
+    }
+    BYTES * (view.window.width * rows) as f64
+}
+
 /// Light of the ground in sixteen pixels that does not depend on the picture in its mirror: red, green and blue, and the weight of that picture.
 pub(super) type GroundLightBatch = [[f32; LANES]; 4];
 

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use bansho_base::{
     color,
+    image::Rect,
     math::{self, DVec3},
     parameters::BuildError,
-    phenomenon::{Phenomenon, PhenomenonInfo, Remark, Run, Stepping, surroundings::OtherPhenomena},
+    phenomenon::{Phenomenon, PhenomenonInfo, Remark, Run, Stepping, strip::View, surroundings::OtherPhenomena},
     tables::{BuildContext, PhenomenonTable, TableKind},
 };
 
@@ -26,6 +27,7 @@ use crate::{
         burner::Burner,
         derived::{BYTES_PER_PARTICLE, DerivedConstants, check_particle_count},
     },
+    picture_bounds,
 };
 
 impl FlameParticlesParameters {
@@ -116,6 +118,17 @@ impl Phenomenon for FlameParticles {
     fn memory_bytes(&self, pixels: f64) -> f64 {
         // Measured: what is fixed, the particles, and the grids of the picture.
         1e6 + BYTES_PER_PARTICLE * self.parameters().particles as f64 + 44.0 * pixels
+    }
+
+    /// Around each burner the flame and the hot gas above it, which wind may bend.
+    fn picture_bounds(&self, view: &View) -> Rect {
+        let origin = DVec3::from(self.parameters().position);
+        let boxes = self.constants.derived.burners.iter().map(|burner| {
+            let [first, last] = burner.parameters.position.bounds().map(|position| origin + DVec3::from(position));
+            let around = burner.bounding_radius + 0.5 * burner.height;
+            [first - around, last + DVec3::new(around, burner.bounding_radius + 2.0 * burner.height, around)]
+        });
+        picture_bounds::of_boxes(view, boxes)
     }
 
     fn luminance(&self) -> f64 {

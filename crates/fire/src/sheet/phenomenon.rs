@@ -7,6 +7,7 @@ use bansho_base::{
         assets::{Assets, Picture},
         observer::{Cancelled, Observer, check},
     },
+    image::Rect,
     math::{self, DVec3},
     parameters::{BuildError, Parameter},
     phenomenon::{
@@ -25,7 +26,7 @@ use super::{
     render::aovs::AOVS,
     texture::TABLE_BYTES,
 };
-use crate::{GAS_FLOW, POSITION};
+use crate::{GAS_FLOW, POSITION, picture_bounds};
 
 /// What [`SharedMemory`] calls the filtered tables of fractals.
 const FILTERED_TABLES: &str = "filtered fractal tables";
@@ -133,6 +134,15 @@ impl Phenomenon for FlameSheet {
             TextureKind::Fractal | TextureKind::OhshimaItahashiExact => 0.0,
         };
         tables + own_texture + 0.5 * pixels
+    }
+
+    fn picture_bounds(&self, view: &View) -> Rect {
+        let boxes = self.flames.iter().map(|flame| {
+            let (base, size) = (self.base(flame, view.shutter.middle()), self.sheet_size(flame));
+            let across = 0.5 * size.x;
+            [base - DVec3::new(across, 0.0, across), base + DVec3::new(across, size.y, across)]
+        });
+        picture_bounds::of_boxes(view, boxes)
     }
 
     fn shared_memory(&self, view: &View) -> Vec<SharedMemory> {

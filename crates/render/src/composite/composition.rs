@@ -91,6 +91,13 @@ pub(crate) struct Composition<'a> {
 /// Scratch memory of all threads.
 pub(crate) type StripScratches = ScratchPool<StripScratch, fn() -> StripScratch>;
 
+/// Scratch memory of a thread that draws strips of a view, bytes.
+pub fn scratch_bytes_per_thread(view: &View) -> f64 {
+    /// Planes in single precision: color, transmittance and depth of two composites and of a strip.
+    const PLANES: usize = 14;
+    (PLANES * size_of::<f32>() * STRIP_ROWS * view.window.width) as f64
+}
+
 /// Scratch memory of all threads, before any is needed.
 pub(crate) fn scratches() -> StripScratches {
     ScratchPool::new(StripScratch::default)

@@ -78,12 +78,17 @@ pub struct Shot {
     recycled: Option<Frame>,
     /// Memory for the glare of frames.
     pyramid: Pyramid,
-    scratches: StripScratches,
+    /// Shared by shots that are drawn at once, so that there are no more than threads.
+    scratches: Arc<StripScratches>,
 }
 
 impl Shot {
     /// A shot of `compiled` in its initial state. Builds nothing.
     pub fn open(compiled: Arc<CompiledScene>, plan: Arc<Plan>) -> Self {
+        Self::with_scratches(compiled, plan, Arc::new(composition::scratches()))
+    }
+
+    fn with_scratches(compiled: Arc<CompiledScene>, plan: Arc<Plan>, scratches: Arc<StripScratches>) -> Self {
         Self {
             runs: compiled.start(),
             number: plan.frames().start,
@@ -93,7 +98,7 @@ impl Shot {
             has_earlier_state: false,
             recycled: None,
             pyramid: Pyramid::default(),
-            scratches: composition::scratches(),
+            scratches,
         }
     }
 
@@ -101,7 +106,8 @@ impl Shot {
     /// scene is simulated in steps, or its wind was changed.
     pub fn independent(&self) -> Option<Self> {
         let is_closed_form = self.runs.iter().all(|run| run.stepping.is_none()) && self.context.wind.is_planned();
-        is_closed_form.then(|| Self::open(self.context.compiled.clone(), self.context.plan.clone()))
+        let (compiled, plan) = (self.context.compiled.clone(), self.context.plan.clone());
+        is_closed_form.then(|| Self::with_scratches(compiled, plan, self.scratches.clone()))
     }
 
     /// Steps all simulations to frame `number`; restarts them if they are past it.

@@ -4,10 +4,14 @@ use std::collections::{BTreeMap, HashMap};
 
 use bansho_base::{
     host::{memory, plural::counted, printable::printable},
+    image::Rect,
     parameters::ProblemKind,
-    phenomenon::SharedMemory,
+    phenomenon::{SharedMemory, strip::View},
 };
-use bansho_render::{CompiledScene, Plan, display::BitDepth, lit_plate_bytes, moment_bytes_per_thread, source_window};
+use bansho_render::{
+    CompiledScene, Plan, display::BitDepth, lit_plate_bytes, moment_bytes_per_thread, scratch_bytes_per_thread,
+    source_window,
+};
 
 use crate::job::{
     FramesInFlight,
@@ -38,8 +42,10 @@ const MIN_THREADS_FOR_MANY: usize = 8;
 const MIN_FRAMES_FOR_EACH: usize = 16;
 /// Most frames that are drawn at once, unless their number is stated: with more of them threads share the caches of fewer.
 const MAX_DRAWN_AT_ONCE: usize = 16;
-/// Bytes of the process without a picture.
-const PROCESS_BYTES: f64 = 1.2e7;
+/// Bytes of the process without a picture, with what the allocator keeps for later.
+const PROCESS_BYTES: f64 = 1.6e7;
+/// Number of pixels at which the memory of phenomena is compared with that without any.
+const MANY_PIXELS: f64 = 1e6;
 const GIB: f64 = (1 << 30) as f64;
 
 /// Of how many frames of `bytes` bytes the pixels may be in memory at once. Where a frame is written from its pixels, another one is drawn meanwhile.
@@ -77,15 +83,21 @@ pub(crate) fn frames_drawn_at_once(compiled: &CompiledScene, plan: &Plan, reques
             let window = source_window(plan);
             let frame = FrameBytes::new(compiled, plan, request, channel_count(compiled, plan));
             let pixels = pixel_count([window.width, window.height], 0);
-            let bytes = (frame.drawn() + frame.written) * pixels + phenomena_bytes(compiled, plan, pixels);
+            let phenomena = PhenomenaBytes::new(compiled, plan);
+            let bytes = (frame.drawn() + frame.written) * pixels + phenomena.frame * pixels;
             let by_memory = (MAX_BYTES_DRAWN_AT_ONCE / bytes.max(1.0)) as usize;
             let most = threads.min(MAX_DRAWN_AT_ONCE).min(by_memory).min(request.frames / MIN_FRAMES_FOR_EACH);
             // One frame may fit where several do not.
-            let fixed = fixed_picture_bytes(compiled, plan);
+            let fixed = fixed_picture_bytes(compiled, plan) + phenomena.fixed;
             (2..=most).rev().find(|count| memory::can_allocate(*count as f64 * bytes + fixed)).unwrap_or(1)
         }
     };
     count.min(request.frames).max(1)
+}
+
+/// How many of the frames that may be drawn at once take memory: a thread that waits for parts of its frame takes on another one, and seldom more.
+fn frames_in_memory(drawn_at_once: usize) -> usize {
+    drawn_at_once.min(2 * rayon::current_num_threads() - 1)
 }
 
 /// Memory of a frame for each of its pixels, bytes.
@@ -112,13 +124,14 @@ impl FrameBytes {
         // The pyramid, and the light without that of the plate.
         let plate_apart = if plan.scene().has_plate() { FRAME_BYTES } else { 0.0 };
         let glare = if has_glare { FRAME_BYTES / 3.0 + plate_apart } else { 0.0 };
-        // A display picture, the samples of the file and the file itself; an EXR has half-precision colors and single-precision channels.
+        // Compressed samples and the file that they are copied to, of a picture that noise fills; an EXR has half-precision colors and single-precision
+        // channels.
         let [display, written] = match request.display {
-            Some(BitDepth::Eight) => [4.0, 3.0 + 2.0],
-            Some(BitDepth::Sixteen) => [8.0, 6.0 + 5.0],
+            Some(BitDepth::Eight) => [4.0, 3.75 + 3.75],
+            Some(BitDepth::Sixteen) => [8.0, 7.0 + 7.0],
             None => [0.0, 12.0 + 3.0 * channels as f64],
         };
-        Self { light, glare, display, written }
+        Self { light, glare, display, written: covered_part(compiled, plan) * written }
     }
 
     /// What a frame takes while it is drawn.
@@ -139,27 +152,30 @@ impl BytesPerPixel {
     /// The memory of a job whose frames have `channels` channels of layers and AOVs.
     fn new(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, channels: usize) -> Self {
         let frame = FrameBytes::new(compiled, plan, request, channels);
-        // The next picture is drawn while one is written. What remains empty in it takes no memory, but a plate fills it.
-        let has_plate = plan.scene().has_plate();
-        let pictures = if has_plate && request.tiles == 0 { request.frames.min(2) as f64 } else { 1.0 };
+        // The next picture is drawn while one is written. What remains empty in it takes no memory, but a plate, a sky or rain fill it.
+        let is_filled = covered_part(compiled, plan) == 1.0;
+        let pictures = if is_filled && request.tiles == 0 { request.frames.min(2) as f64 } else { 1.0 };
         let written = pictures * frame.display + frame.written;
         // One frame is written while another one is drawn, in the memory of the former where it is large and its pixels are no longer needed
-        // (`draw_frames`). A sheet keeps the pixels of all, and is laid out and encoded as a whole.
+        // (`draw_frames`). Of a display picture the light is free once it is drawn. A sheet keeps the pixels of all, and is laid out and encoded as a whole.
         let window = plan.window();
         let light_bytes = window.width * window.height * frame.light as usize;
         let max_with_pixels = max_frames_with_pixels(light_bytes, request.display.is_none());
-        let (with_light, encoded) = (request.frames.min(2).min(max_with_pixels), request.tiles.max(1));
+        let keeps_light = request.display.is_none() || request.tiles > 0;
+        let with_light = if keeps_light { request.frames.min(2).min(max_with_pixels) } else { 1 };
+        let encoded = request.tiles.max(1);
         let one_after_the_other = with_light as f64 * frame.light + frame.glare + encoded as f64 * written;
-        let drawn = match frames_drawn_at_once(compiled, plan, request) {
-            1 => one_after_the_other,
-            count => count as f64 * (frame.drawn() + frame.written) + (encoded - 1) as f64 * written,
+        let at_once = frames_in_memory(frames_drawn_at_once(compiled, plan, request)) as f64;
+        let drawn = if at_once > 1.0 {
+            at_once * (frame.drawn() + frame.written) + (encoded - 1) as f64 * written
+        } else {
+            one_after_the_other
         };
         let plate_depth = if plan.scene().plate.depth.is_some() { DEPTH_BYTES } else { 0.0 };
-        let plate = if has_plate { FRAME_BYTES + plate_depth } else { 0.0 };
-        // Each of the frames that are drawn at once lights a plate of its own.
-        let at_once = frames_drawn_at_once(compiled, plan, request) as f64;
-        let lit = at_once * lit_plate_bytes(compiled, plan);
-        Self { drawn, whole: plate + lit + reflected(compiled, plan, plate) }
+        let plate = if plan.scene().has_plate() { FRAME_BYTES + plate_depth } else { 0.0 };
+        // Each of the frames that are drawn at once has a plate of its own, lights it, and reflects it.
+        let of_plate = plate + lit_plate_bytes(compiled, plan) + reflected(compiled, plan, plate);
+        Self { drawn, whole: at_once * of_plate }
     }
 
     fn total(&self, drawn_pixels: f64, whole_pixels: f64) -> f64 {
@@ -189,29 +205,60 @@ pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: Me
     let (drawn, whole) =
         (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
     let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
-    let at_once = frames_drawn_at_once(compiled, plan, request) as f64;
+    let at_once = frames_in_memory(frames_drawn_at_once(compiled, plan, request)) as f64;
+    let phenomena = PhenomenaBytes::new(compiled, plan);
     per_pixel.total(drawn, whole)
-        + at_once * phenomena_bytes(compiled, plan, drawn)
+        + at_once * phenomena.frame * drawn
+        + phenomena.fixed
         + fixed_picture_bytes(compiled, plan)
 }
 
-/// Memory of the file of a plate, of the moments of exposures, and of the process, bytes.
+/// Memory of the file of a plate, of the strips and of the moments of exposures, and of the process, bytes.
 fn fixed_picture_bytes(compiled: &CompiledScene, plan: &Plan) -> f64 {
     let layers = if plan.layers { compiled.phenomena().count() } else { 0 };
-    let moments = moment_bytes_per_thread(&plan.view(plan.frames().start), layers);
-    plate_file_bytes(compiled) + rayon::current_num_threads() as f64 * moments + PROCESS_BYTES
+    let view = plan.view(plan.frames().start);
+    let of_thread = moment_bytes_per_thread(&view, layers) + scratch_bytes_per_thread(&view);
+    plate_file_bytes(compiled) + rayon::current_num_threads() as f64 * of_thread + PROCESS_BYTES
 }
 
-/// Memory of all phenomena for a picture of `drawn` pixels, bytes. What several of them share counts once.
-fn phenomena_bytes(compiled: &CompiledScene, plan: &Plan, drawn: f64) -> f64 {
+/// Memory of all phenomena, bytes.
+struct PhenomenaBytes {
+    /// What frames that are drawn at once have in common. What several phenomena share counts once.
+    fixed: f64,
+    /// For each pixel that is drawn of each of these frames.
+    frame: f64,
+}
+
+impl PhenomenaBytes {
+    fn new(compiled: &CompiledScene, plan: &Plan) -> Self {
+        let view = plan.view(plan.frames().start);
+        let (mut fixed, mut frame, mut shared) = (0.0, 0.0, BTreeMap::new());
+        for phenomenon in compiled.phenomena() {
+            let without_pixels = phenomenon.memory_bytes(0.0);
+            // Memory of phenomena is proportional to the pixels that they cover.
+            let of_pixels = phenomenon.memory_bytes(MANY_PIXELS) - without_pixels;
+            fixed += without_pixels;
+            frame += of_pixels / MANY_PIXELS * part_of_window(&view, phenomenon.picture_bounds(&view));
+            shared.extend(phenomenon.shared_memory(&view).into_iter().map(|SharedMemory { key, bytes }| (key, bytes)));
+        }
+        Self { fixed: fixed + shared.values().sum::<f64>(), frame }
+    }
+}
+
+/// The part of the window of a view that `rect` covers.
+fn part_of_window(view: &View, rect: Rect) -> f64 {
+    let [covered, window] = [rect, view.window].map(|rect| (rect.width * rect.height) as f64);
+    covered / window.max(1.0)
+}
+
+/// The part of a picture that is not empty: 1 where a plate, a sky, a ground or rain fills it, less where flames burn in the dark.
+fn covered_part(compiled: &CompiledScene, plan: &Plan) -> f64 {
+    if plan.scene().has_plate() {
+        return 1.0;
+    }
     let view = plan.view(plan.frames().start);
-    let own: f64 = compiled.phenomena().map(|phenomenon| phenomenon.memory_bytes(drawn)).sum();
-    let shared: BTreeMap<_, f64> = compiled
-        .phenomena()
-        .flat_map(|phenomenon| phenomenon.shared_memory(&view))
-        .map(|SharedMemory { key, bytes }| (key, bytes))
-        .collect();
-    own + shared.values().sum::<f64>()
+    let bounds = compiled.phenomena().map(|phenomenon| phenomenon.picture_bounds(&view));
+    part_of_window(&view, bounds.fold(Rect::default(), |all, rect| all.union(&rect)))
 }
 
 /// Memory of the files of a plate, bytes, which does not depend on the size of the picture.
@@ -301,7 +348,7 @@ pub(crate) fn check(
 
 /// Memory that does not depend on the size of the picture, bytes.
 fn fixed_bytes(compiled: &CompiledScene, plan: &Plan) -> f64 {
-    phenomena_bytes(compiled, plan, 0.0) + fixed_picture_bytes(compiled, plan)
+    PhenomenaBytes::new(compiled, plan).fixed + fixed_picture_bytes(compiled, plan)
 }
 
 /// Checks that the phenomena fit into memory whatever the size of the picture.
@@ -367,6 +414,11 @@ mod tests {
 
     /// The estimate for one 8-bit frame of a plate of some pixels.
     fn of_plate(picture: &str, pixels: [usize; 2]) -> f64 {
+        of_plates(picture, pixels, 1, 1)
+    }
+
+    /// The estimate for 8-bit frames of a plate of some pixels, of which several are drawn at once.
+    fn of_plates(picture: &str, pixels: [usize; 2], frames: usize, in_flight: usize) -> f64 {
         let mut assets = MemoryAssets::default();
         let image = Image::filled(pixels[0], pixels[1], [0.5, 0.5, 0.5, 1.0]);
         assets.insert_picture("plate.png", Picture::opaque(image, Encoding::DisplaySrgb));
@@ -374,11 +426,11 @@ mod tests {
         let compiled = crate::compile_scene("test", &text, Arc::new(assets)).unwrap();
         let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
         let request = MemoryRequest {
-            frames: 1,
+            frames,
             tiles: 0,
             display: Some(BitDepth::Eight),
             size_is_option: false,
-            in_flight: FramesInFlight::Auto,
+            in_flight: FramesInFlight::Count(in_flight),
         };
         estimated_bytes(&compiled, &plan, request)
     }
@@ -389,7 +441,21 @@ mod tests {
         let large_file = of_plate("[100, 100]", [1100, 1000]) - small;
         assert!((large_file / 1.09e6 - PLATE_FILE_BYTES).abs() < 0.01, "{large_file}");
         let large_picture = of_plate("[1100, 1000]", [100, 100]) - small;
-        assert!((large_picture / 1.09e6 - (FRAME_BYTES + 9.0)).abs() < 0.01, "{large_picture}");
+        assert!((large_picture / 1.09e6 - (FRAME_BYTES + 4.0 + 7.5)).abs() < 0.01, "{large_picture}");
+    }
+
+    #[test]
+    fn every_frame_in_flight_has_a_plate_and_pictures_as_far_as_threads_draw_them() {
+        const PIXELS: f64 = 1.1e6;
+        let estimate = |in_flight| of_plates("[1100, 1000]", [100, 100], 99, in_flight);
+        let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let [three, four, nine] = pool(8).install(|| [3, 4, 9].map(estimate));
+        let of_frame = (four - three) / PIXELS;
+        assert!((of_frame - (FRAME_BYTES + 4.0 + 7.5)).abs() < 0.01, "{of_frame}");
+        assert!(((nine - four) / PIXELS - 5.0 * of_frame).abs() < 0.01, "{nine}");
+        // Each of two threads draws a frame and, while it waits, one of them another.
+        let [three, nine] = pool(2).install(|| [3, 9].map(estimate));
+        assert!((three - nine).abs() < 1.0, "{three} {nine}");
     }
 
     #[test]

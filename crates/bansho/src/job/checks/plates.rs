@@ -86,6 +86,7 @@ fn message(error: &AssetError, first: i64, count: usize, frames: usize, fault: &
 /// Adds the position in the scene to the error of a plate that was damaged or removed during the job. Other errors are unchanged.
 pub(crate) fn with_position(scene: &SceneFile, error: JobError) -> JobError {
     match error {
+        JobError::Frame { number, source } => with_position(scene, *source).in_frame(number),
         JobError::Render(RenderError::Plate(error)) => scene.error_at(&format!("plate.{}", error.key), error.kind),
         other => other,
     }

@@ -71,6 +71,14 @@ pub enum JobError {
     /// The name of the output cannot be used.
     #[error(transparent)]
     Naming(#[from] NamingError),
+    /// A frame could not be drawn, encoded or written.
+    #[error("frame {number}: {source}")]
+    Frame {
+        /// Its number.
+        number: i64,
+        /// Why.
+        source: Box<Self>,
+    },
     /// Drawing failed.
     #[error(transparent)]
     Render(RenderError),
@@ -168,6 +176,30 @@ pub enum ErrorCategory {
 }
 
 impl JobError {
+    /// As the failure of frame `number`. A canceled job is not the failure of a frame.
+    pub fn in_frame(self, number: i64) -> Self {
+        match self {
+            Self::Cancelled | Self::Frame { .. } => self,
+            error => Self::Frame { number, source: Box::new(error) },
+        }
+    }
+
+    /// The number of the frame that failed, if it was one.
+    pub fn frame(&self) -> Option<i64> {
+        match self {
+            Self::Frame { number, .. } => Some(*number),
+            _ => None,
+        }
+    }
+
+    /// The error without the number of its frame.
+    pub fn without_frame(&self) -> &Self {
+        match self {
+            Self::Frame { source, .. } => source.without_frame(),
+            error => error,
+        }
+    }
+
     /// For an `output` that contains all frames and is written at the end: its own message for a canceled job. Other errors are unchanged.
     pub(crate) fn for_single_file(self, output: &'static str) -> Self {
         if matches!(self, Self::Cancelled) { Self::SingleFileCancelled { output } } else { self }
@@ -176,6 +208,7 @@ impl JobError {
     /// What the error is about.
     pub fn category(&self) -> ErrorCategory {
         match self {
+            Self::Frame { source, .. } => source.category(),
             Self::Unreadable { .. } | Self::NotUtf8 { .. } | Self::Scene(_) => ErrorCategory::Scene,
             Self::Edit { .. }
             | Self::ChangedScene(_)
@@ -197,7 +230,7 @@ impl JobError {
 
     /// The problems of the scene, if these are the reason.
     pub fn scene(&self) -> Option<&SceneError> {
-        match self {
+        match self.without_frame() {
             Self::Scene(error) | Self::ChangedScene(error) => Some(error),
             _ => None,
         }

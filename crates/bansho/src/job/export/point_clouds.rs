@@ -106,12 +106,13 @@ impl PreparedSimulation {
             if last.is_none_or(|last| number != last + 1) {
                 told = self.snapshots.warm_up(&mut shot, last, number, observer, observer)?;
             }
-            shot.advance(number, observer)?;
+            shot.advance(number, observer).map_err(|error| JobError::from(error).in_frame(number))?;
             self.snapshots.save(&shot, number, &told, observer, observer)?;
             last = Some(number);
             let _stage = StageGuard::begin(observer, Stage::Write);
             let path = self.pattern.path(number);
-            atomic::write_bytes(&path, &ply::encode(&shot.particles()), &self.overwrite)?;
+            atomic::write_bytes(&path, &ply::encode(&shot.particles()), &self.overwrite)
+                .map_err(|error| JobError::from(error).in_frame(number))?;
             finished.record(path.clone());
             observer.frame_done(&FrameDone { number, path: Some(path), drawn: index + 1 });
         }

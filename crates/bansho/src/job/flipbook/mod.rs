@@ -210,6 +210,12 @@ impl PreparedFlipbook {
         self.memory_bytes
     }
 
+    /// How many frames are drawn at once in the caller's rayon pool; fewer if the crop makes them larger.
+    pub fn frames_in_flight(&self) -> usize {
+        let request = memory_request(self.numbers.len(), self.files.bits);
+        memory::frames_drawn_at_once(&self.compiled, &self.plan, request)
+    }
+
     /// Draws all frames in the caller's rayon pool and writes the sheets.
     ///
     /// # Errors
@@ -221,6 +227,7 @@ impl PreparedFlipbook {
         let collector = TileCollector::new(sheet.count, observer, |frame, observer| files.tile(frame, observer));
         let mut shot = LightRecorder::new(Shot::open(compiled.clone(), plan.clone()));
         let at_once = memory::frames_drawn_at_once(compiled, plan, memory_request(numbers.len(), files.bits));
+        let at_once = at_once.min(self.frames_in_flight());
         draw_frames(&mut shot, numbers, &Snapshots::default(), at_once, &collector, observer)
             .map_err(|error| self.described(error))?;
         let tiles = collector.into_tiles();

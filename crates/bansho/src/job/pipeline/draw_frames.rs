@@ -141,7 +141,7 @@ const MAX_BYTES_IN_FLIGHT: usize = 1 << 30;
 /// Runs in the caller's rayon pool, and uses no other thread.
 ///
 /// # Errors
-/// The failure of a frame, of several that of the first in the list, or the observer canceled the job. The frames before it that are finished are kept; none after it is
+/// The failure of a frame, with its number, of several that of the first in the list; or the observer canceled the job. The frames before it that are finished are kept; none after it is
 /// written.
 pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
     shot: &mut S,
@@ -167,7 +167,8 @@ pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
             }
             advance(shot, last, number, snapshots, &stop_on_failure, observer)?;
             last = Some(number);
-            let frame = shot.draw(sink.target(), &stop_on_failure)?;
+            let frame =
+                shot.draw(sink.target(), &stop_on_failure).map_err(|error| JobError::from(error).in_frame(number))?;
             let light_bytes = frame.light_bytes();
             max_with_light = max_frames_with_pixels(light_bytes, sink.writes_pixels());
             in_flight.submit(index, in_flight_limit(light_bytes, sink.max_in_flight()), frame.keeps_light());
@@ -176,7 +177,7 @@ pub(crate) fn draw_frames<S: FrameSource, K: FrameSink>(
         Ok(())
     });
     // A failed frame also cancels the drawing, whose own error is then `Cancelled`: the first failure is the one to report.
-    in_flight.take_error().map_or(drawn, Err)?;
+    in_flight.take_error(numbers).map_or(drawn, Err)?;
     check(observer).map_err(|_| JobError::Cancelled)
 }
 
@@ -218,7 +219,7 @@ fn draw_independent<S: FrameSource, K: FrameSink>(
             });
         }
     });
-    in_flight.take_error().map_or(Ok(()), Err)?;
+    in_flight.take_error(numbers).map_or(Ok(()), Err)?;
     check(observer).map_err(|_| JobError::Cancelled)
 }
 
@@ -296,7 +297,7 @@ fn advance(
     if last.is_none_or(|last| number != last + 1) {
         told = snapshots.warm_up(shot, last, number, stop_on_failure, observer)?;
     }
-    shot.advance(number, stop_on_failure)?;
+    shot.advance(number, stop_on_failure).map_err(|error| JobError::from(error).in_frame(number))?;
     snapshots.save(shot, number, &told, stop_on_failure, observer)
 }
 
@@ -384,10 +385,12 @@ mod tests {
                 finished.fetch_add(1, Ordering::Relaxed);
                 if index == 5 { Err(OptionError::NoFrames.into()) } else { Ok(()) }
             };
-            let numbers: Vec<i64> = (0..100_000).collect();
+            let numbers: Vec<i64> = (7..100_000).collect();
             let sink = FunctionSink::new(each, 8);
             let result = in_pool(4, || run(&numbers, drawn_at_once, &sink, &RecordingObserver::default()));
-            assert!(matches!(result, Err(JobError::Option(OptionError::NoFrames))), "{result:?}");
+            let error = result.unwrap_err();
+            assert_eq!(error.frame(), Some(12), "{error:?}");
+            assert!(matches!(error.without_frame(), JobError::Option(OptionError::NoFrames)), "{error:?}");
             let committed = sink.committed.into_inner().unwrap();
             assert!(committed.len() <= 5 && committed.iter().copied().eq(0..committed.len()), "{committed:?}");
             assert!(finished.into_inner() < 100, "drawing must stop");

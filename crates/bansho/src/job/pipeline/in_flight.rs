@@ -109,9 +109,9 @@ impl InFlightFrames {
         self.failed.load(Ordering::Relaxed)
     }
 
-    /// The failure of the first frame that failed, if there was one.
-    pub(crate) fn take_error(&self) -> Option<JobError> {
-        self.lock().error.take().map(|(_, error)| error)
+    /// The failure of the first frame that failed, if there was one, with the number of the frame; `numbers` are those of all frames.
+    pub(crate) fn take_error(&self, numbers: &[i64]) -> Option<JobError> {
+        self.lock().error.take().map(|(index, error)| error.in_frame(numbers[index]))
     }
 }
 
@@ -233,8 +233,9 @@ mod tests {
             let in_flight = InFlightFrames::default();
             failures.into_iter().zip([4, 3]).for_each(|(error, index)| in_flight.fail(index, error));
             assert!(in_flight.has_failed());
-            let kept = in_flight.take_error();
-            assert!(matches!(kept, Some(JobError::Media(MediaError::DiskFull { .. }))), "{kept:?}");
+            let kept = in_flight.take_error(&[0, 1, 2, 3, 14]).unwrap();
+            assert_eq!(kept.frame(), Some(14), "{kept:?}");
+            assert!(matches!(kept.without_frame(), JobError::Media(MediaError::DiskFull { .. })), "{kept:?}");
         }
     }
 
@@ -246,10 +247,9 @@ mod tests {
         in_flight.fail(5, full("5.png"));
         in_flight.fail(6, full("6.png"));
         in_flight.fail(4, JobError::Cancelled);
-        let kept = in_flight.take_error();
-        let is_first =
-            matches!(&kept, Some(JobError::Media(MediaError::DiskFull { path })) if path.as_os_str() == "5.png");
-        assert!(is_first, "{kept:?}");
+        let numbers: Vec<i64> = (10..20).collect();
+        let kept = in_flight.take_error(&numbers).unwrap();
+        assert!(kept.to_string().starts_with("frame 15: 5.png: the disk is full"), "{kept}");
     }
 
     #[test]

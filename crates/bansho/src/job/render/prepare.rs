@@ -84,6 +84,11 @@ impl PreparedJob {
         self.memory_bytes
     }
 
+    /// How many frames are drawn at once.
+    pub fn frames_in_flight(&self) -> usize {
+        self.drawn_at_once
+    }
+
     /// Which existing files may be overwritten.
     pub fn overwrite_policy(&self) -> &OverwritePolicy {
         &self.format.overwrite

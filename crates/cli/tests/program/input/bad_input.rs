@@ -1,6 +1,8 @@
 //! Invalid input: one error for each problem, with its position and what is allowed, the right exit code, and no output.
 
-use crate::support::{FLAME, Folder};
+use std::process::Stdio;
+
+use crate::support::{FLAME, Folder, Run, wait_until};
 
 /// Renders an invalid scene and returns the messages.
 fn refused(scene: &str, code: i32) -> String {
@@ -297,6 +299,26 @@ fn a_plate_that_is_damaged_on_the_way_is_told_with_its_line() {
     let run = folder.run(&["render", "laid.toml", "--out", "f.png"]);
     assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
     says(&run.stderr, &["laid.toml:15:9: plate.image: ", "plate.0002.png: is damaged"]);
+}
+
+#[test]
+fn a_plate_that_is_damaged_while_frames_are_drawn_is_told_with_the_frame() {
+    for in_flight in ["1", "4"] {
+        let folder = with_plates("0-199");
+        let work = ["--frames", "0-199", "--threads", "4", "--frames-in-flight", in_flight];
+        let mut command = folder.command(&[&["render", "laid.toml", "--out", "f/f.png"], &work[..]].concat());
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        wait_until("a frame", || folder.path("f/f.0000.png").exists());
+        std::fs::write(folder.path("plate.0190.png"), "no picture").unwrap();
+        let run = Run::of(child.wait_with_output().unwrap());
+        assert_eq!((run.code, run.errors()), (Some(3), 1), "{}", run.stderr);
+        says(&run.stderr, &["error: frame 190: laid.toml:15:9: plate.image: ", "plate.0190.png: is damaged"]);
+        assert_eq!(run.stderr.matches("frame ").count(), 1, "{}", run.stderr);
+        let files = folder.files("f");
+        assert!((1..=190).contains(&files.len()), "{}", files.len());
+        let in_order = files.keys().enumerate().all(|(index, name)| *name == format!("f.{index:04}.png"));
+        assert!(in_order, "{:?}", files.keys());
+    }
 }
 
 #[test]

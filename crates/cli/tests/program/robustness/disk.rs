@@ -67,6 +67,41 @@ fn a_folder_that_may_not_be_written_is_an_error_before_anything_is_drawn() {
     assert!(folder.files("locked").is_empty() && !folder.path("locked/deep").exists());
 }
 
+/// Rain that sets in after half a second, so that the files of later frames are larger.
+const GROWING_RAIN: &str = "\
+bansho = 2
+[picture]
+size = [192, 144]
+frames = 24
+[sky]
+[[rain]]
+rate_mm_per_h = { keys = [[0.0, 0.0], [0.45, 0.0], [0.55, 200.0]] }
+";
+
+#[test]
+fn a_frame_that_cannot_be_written_stops_the_shot_with_its_number_and_leaves_those_before() {
+    let folder = Folder::with_scene(GROWING_RAIN);
+    folder.succeed(&["render", "scene.toml", "--out", "whole/f.png"]);
+    let whole = folder.files("whole");
+    // As many kibibytes as the first frames need and the others exceed.
+    let kibibytes = whole["f.0000.png"].len().div_ceil(1024);
+    let failing = whole.values().position(|file| file.len() > 1024 * kibibytes).unwrap();
+    assert!((8..20).contains(&failing), "{failing}");
+    for in_flight in ["1", "4"] {
+        let line = format!(
+            "ulimit -f {kibibytes}; exec {} render scene.toml --threads 4 --frames-in-flight {in_flight} --out {in_flight}/f.png",
+            env!("CARGO_BIN_EXE_bansho")
+        );
+        let run = Run::of(Command::new("bash").args(["-c", &line]).current_dir(folder.path("")).output().unwrap());
+        assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
+        let expected = format!("error: frame {failing}: {in_flight}/f.{failing:04}.png: the file would be larger than");
+        assert!(run.stderr.contains(&expected), "{}", run.stderr);
+        assert_eq!(run.stderr.matches("frame ").count(), 1, "{}", run.stderr);
+        let files = folder.files(in_flight);
+        assert!(files.iter().eq(whole.iter().take(failing)), "{in_flight} in flight: {:?}", files.keys());
+    }
+}
+
 /// A disk of its own with room for a few frames, until it is dropped.
 struct SmallDisk(PathBuf);
 
@@ -92,14 +127,20 @@ impl Drop for SmallDisk {
 fn a_full_disk_is_an_error_and_leaves_only_whole_frames() {
     let folder = Folder::with_scene(&FLAME.replace("48, 64", "96, 128").replace("frames = 6", "frames = 100"));
     let _disk = SmallDisk::mount(&folder.path("disk"), 64);
-    let run = folder.run(&["render", "scene.toml", "--out", "disk/f.png", "--bits", "16"]);
-    assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
-    assert!(run.stderr.contains("the disk is full"), "{}", run.stderr);
-    let files = folder.files("disk");
-    assert!((1..100).contains(&files.len()), "{:?}", files.keys());
-    for (name, bytes) in &files {
-        assert!(name.ends_with(".png"), "{name}");
-        assert_eq!(decode_png(bytes).width, 96, "{name}");
+    for in_flight in ["4", "1"] {
+        folder.files("disk").keys().for_each(|name| fs::remove_file(folder.path("disk").join(name)).unwrap());
+        let work = ["--bits", "16", "--threads", "4", "--frames-in-flight", in_flight];
+        let run = folder.run(&[&["render", "scene.toml", "--out", "disk/f.png"], &work[..]].concat());
+        assert_eq!((run.code, run.errors()), (Some(1), 1), "{}", run.stderr);
+        assert!(run.stderr.contains("the disk is full"), "{}", run.stderr);
+        // The frames before the one that failed, and no other.
+        let files = folder.files("disk");
+        assert!((1..100).contains(&files.len()), "{:?}", files.keys());
+        assert!(run.stderr.contains(&format!("error: frame {}: ", files.len())), "{}: {}", files.len(), run.stderr);
+        for (index, (name, bytes)) in files.iter().enumerate() {
+            assert_eq!(*name, format!("f.{index:04}.png"));
+            assert_eq!(decode_png(bytes).width, 96, "{name}");
+        }
     }
     // What is left of the disk is filled to the last block.
     let filler = folder.path("disk/filler");

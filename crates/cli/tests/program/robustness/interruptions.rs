@@ -35,9 +35,10 @@ fn signal(child: &Child, name: &str) {
 fn killed_in_the_middle_only_whole_frames_bear_names_and_resume_completes_them() {
     let folder = long_scene();
     let numbers = ["--frames", "0-59"];
-    for extension in ["png", "exr"] {
+    for (extension, in_flight) in [("png", "1"), ("exr", "4")] {
         let killed = format!("{extension}/f.{extension}");
-        let mut child = start(&folder, &["render", "scene.toml", "--out", &killed]);
+        let work = ["--threads", "4", "--frames-in-flight", in_flight];
+        let mut child = start(&folder, &[&["render", "scene.toml", "--out", &killed], &work[..]].concat());
         wait_until("some frames", || finished(&folder, extension) >= 7);
         child.kill().unwrap();
         let status = child.wait().unwrap();
@@ -54,7 +55,8 @@ fn killed_in_the_middle_only_whole_frames_bear_names_and_resume_completes_them()
         }
         let whole = format!("{extension} whole/f.{extension}");
         folder.succeed(&[&["render", "scene.toml", "--out", &whole], &numbers[..]].concat());
-        let resumed = folder.succeed(&[&["render", "scene.toml", "--resume", "--out", &killed], &numbers[..]].concat());
+        let resume = ["render", "scene.toml", "--resume", "--out", &killed];
+        let resumed = folder.succeed(&[&resume, &numbers[..], &work[..]].concat());
         assert!(resumed.stderr.contains("were kept"), "{}", resumed.stderr);
         let all = folder.files(extension);
         let expected = folder.files(&format!("{extension} whole"));
@@ -111,11 +113,12 @@ fn resume_does_not_trust_other_bits() {
 
 #[cfg(unix)]
 #[test]
-fn a_signal_stops_it_within_a_second_with_its_own_exit_code() {
+fn a_signal_stops_it_within_a_second_with_its_own_exit_code_and_resume_continues_to_the_same_bytes() {
     use std::time::{Duration, Instant};
-    for (name, code) in [("INT", 130), ("TERM", 143)] {
+    for (name, code, in_flight) in [("INT", 130, "1"), ("TERM", 143, "1"), ("INT", 130, "4"), ("TERM", 143, "3")] {
         let folder = long_scene();
-        let child = start(&folder, &["render", "scene.toml", "--out", "f/f.png"]);
+        let work = ["--threads", "4", "--frames-in-flight", in_flight];
+        let child = start(&folder, &[&["render", "scene.toml", "--out", "f/f.png"], &work[..]].concat());
         wait_until("a frame", || finished(&folder, "f/") >= 1);
         signal(&child, name);
         let since = Instant::now();
@@ -125,6 +128,15 @@ fn a_signal_stops_it_within_a_second_with_its_own_exit_code() {
         let files = folder.files("f");
         assert!(files.keys().all(|name| name.ends_with(".png")), "no temporary file stays: {:?}", files.keys());
         assert!(files.values().all(|bytes| decode_png(bytes).width == 160));
+        let in_order = files.keys().enumerate().all(|(index, name)| *name == format!("f.{index:04}.png"));
+        assert!(in_order, "no frame is named before those it follows: {:?}", files.keys());
+        let frames = format!("0-{}", files.len() + 8);
+        let shot = ["render", "scene.toml", "--frames", &frames];
+        let resumed = folder.succeed(&[&shot[..], &["--resume", "--out", "f/f.png"], &work[..]].concat());
+        let kept = if files.len() == 1 { "1 was kept".to_owned() } else { format!("{} were kept", files.len()) };
+        assert!(resumed.stderr.starts_with("9 frames in ") && resumed.stderr.contains(&kept), "{}", resumed.stderr);
+        folder.succeed(&[&shot[..], &["--out", "undisturbed/f.png", "--frames-in-flight", "1"][..]].concat());
+        assert!(folder.files("f") == folder.files("undisturbed"), "{name}, {in_flight} in flight");
     }
 }
 

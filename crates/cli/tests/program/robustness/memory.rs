@@ -67,6 +67,31 @@ fn channels_that_there_is_no_memory_for_are_counted() {
 }
 
 #[test]
+fn the_estimated_memory_is_within_a_quarter_of_the_peak() {
+    let scene = |name: &str| format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    // Rain and ground, one frame after the other and four at once; flames in the dark that cover a part of the picture; and haze that refracts a plate.
+    for (name, frames, in_flight) in [
+        ("headlights", 4, "1"),
+        ("headlights", 16, "4"),
+        ("torch", 4, "1"),
+        ("inagaki_still", 3, "1"),
+        ("inagaki_haze", 3, "1"),
+    ] {
+        let folder = Folder::new();
+        let (path, frames) = (scene(name), format!("20-{}", 19 + frames));
+        let work = ["--threads", "4", "--frames-in-flight", in_flight, "--stats", "--progress", "json"];
+        let render = ["render", &path, "--size", "1280x720", "--frames", &frames, "--out", "f.####.png"];
+        let run = folder.succeed(&[&render[..], &work[..]].concat());
+        let mut events = run.stdout.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+        let stats = events.find(|event| event["event"] == "stats").unwrap();
+        let mebibytes = |key: &str| stats[key].as_f64().unwrap();
+        let ratio = mebibytes("estimated_memory_mib") / mebibytes("peak_memory_mib");
+        assert!((0.75..1.25).contains(&ratio), "{name}, {in_flight} in flight: {ratio}: {stats}");
+        assert_eq!(stats["frames_in_flight"], serde_json::json!(in_flight.parse::<usize>().unwrap()), "{stats}");
+    }
+}
+
+#[test]
 fn more_frames_in_flight_than_there_is_memory_for_are_refused_with_the_number_that_fits() {
     let folder = Folder::with_scene(FLAME);
     let render = |count: &str| {
