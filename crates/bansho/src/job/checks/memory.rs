@@ -150,7 +150,9 @@ struct BytesPerPixel {
 
 impl BytesPerPixel {
     /// The memory of a job whose frames have `channels` channels of layers and AOVs.
-    fn new(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, channels: usize) -> Self {
+    /// Of the frames that are drawn at once, `at_once` are in memory.
+    fn new(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, channels: usize, at_once: usize) -> Self {
+        let at_once = at_once as f64;
         let frame = FrameBytes::new(compiled, plan, request, channels);
         // The next picture is drawn while one is written. What remains empty in it takes no memory, but a plate, a sky or rain fill it.
         let is_filled = covered_part(compiled, plan) == 1.0;
@@ -165,7 +167,6 @@ impl BytesPerPixel {
         let with_light = if keeps_light { request.frames.min(2).min(max_with_pixels) } else { 1 };
         let encoded = request.tiles.max(1);
         let one_after_the_other = with_light as f64 * frame.light + frame.glare + encoded as f64 * written;
-        let at_once = frames_in_memory(frames_drawn_at_once(compiled, plan, request)) as f64;
         let drawn = if at_once > 1.0 {
             at_once * (frame.drawn() + frame.written) + (encoded - 1) as f64 * written
         } else {
@@ -201,14 +202,24 @@ fn reflected(compiled: &CompiledScene, plan: &Plan, plate: f64) -> f64 {
 /// Memory of a job, bytes: what its pictures take, its phenomena, the file of its plate, and the process. Within a quarter of the measured peak for frames
 /// that take longer to draw than to write.
 pub(crate) fn estimated_bytes(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest) -> f64 {
+    let at_once = frames_in_memory(frames_drawn_at_once(compiled, plan, request));
+    bytes_with_frames(compiled, plan, request, at_once)
+}
+
+/// The same if every frame that may be drawn at once is in memory: what must be available.
+fn largest_bytes(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest) -> f64 {
+    bytes_with_frames(compiled, plan, request, frames_drawn_at_once(compiled, plan, request))
+}
+
+/// Memory of a job, bytes, if `at_once` of the frames that are drawn at once are in memory.
+fn bytes_with_frames(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, at_once: usize) -> f64 {
     let window = source_window(plan);
     let (drawn, whole) =
         (pixel_count([window.width, window.height], 0), pixel_count(plan.size(), plan.overscan() as i64));
-    let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan));
-    let at_once = frames_in_memory(frames_drawn_at_once(compiled, plan, request)) as f64;
+    let per_pixel = BytesPerPixel::new(compiled, plan, request, channel_count(compiled, plan), at_once);
     let phenomena = PhenomenaBytes::new(compiled, plan);
     per_pixel.total(drawn, whole)
-        + at_once * phenomena.frame * drawn
+        + at_once as f64 * phenomena.frame * drawn
         + phenomena.fixed
         + fixed_picture_bytes(compiled, plan)
 }
@@ -302,8 +313,9 @@ pub(crate) fn check(
     let (window, overscan) = (plan.window(), plan.overscan() as i64);
     let drawn = pixel_count([window.width, window.height], 0);
     let channels = channel_count(compiled, plan);
-    let per_pixel = BytesPerPixel::new(compiled, plan, request, channels);
-    let bytes = estimated_bytes(compiled, plan, request);
+    let at_once = frames_drawn_at_once(compiled, plan, request);
+    let per_pixel = BytesPerPixel::new(compiled, plan, request, channels, at_once);
+    let bytes = largest_bytes(compiled, plan, request);
     if memory::can_allocate(bytes) {
         return Ok(());
     }
@@ -311,7 +323,7 @@ pub(crate) fn check(
     if let FramesInFlight::Count(count @ 2..) = request.in_flight {
         let fits = |count: usize| {
             let request = MemoryRequest { in_flight: FramesInFlight::Count(count), ..request };
-            memory::can_allocate(estimated_bytes(compiled, plan, request))
+            memory::can_allocate(largest_bytes(compiled, plan, request))
         };
         if let Some(max) = (1..count).take_while(|count| fits(*count)).last() {
             return Err(OptionError::FramesInFlight { count, required_gib: bytes / GIB, max }.into());
