@@ -120,12 +120,12 @@ impl Phenomenon for FlameParticles {
         1e6 + BYTES_PER_PARTICLE * self.parameters().particles as f64 + 44.0 * pixels
     }
 
-    /// Around each burner the flame and the hot gas above it, which wind may bend.
+    /// Around each burner the flame, which sways by about a quarter of its height, and the hot gas above it.
     fn picture_bounds(&self, view: &View) -> Rect {
         let origin = DVec3::from(self.parameters().position);
         let boxes = self.constants.derived.burners.iter().map(|burner| {
             let [first, last] = burner.parameters.position.bounds().map(|position| origin + DVec3::from(position));
-            let around = burner.bounding_radius + 0.5 * burner.height;
+            let around = burner.bounding_radius + 0.25 * burner.height;
             [first - around, last + DVec3::new(around, burner.bounding_radius + 2.0 * burner.height, around)]
         });
         picture_bounds::of_boxes(view, boxes)
