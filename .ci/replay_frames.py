@@ -144,7 +144,7 @@ def main():
     parser.add_argument("--frames", type=int, default=8, help="frames of the shorter of two runs that are measured; the longer has three times as many")
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--shot", type=int, default=256, help="frames of the shot that is replayed")
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     heads = " | ".join(f"{cores} {'core' if cores == 1 else 'cores'}" for cores in [1, 2, *CORES])
     print(f"| scene, {arguments.shot} frames of {arguments.size} | serial | {heads} | frames in flight with {CORES[-1]} | MiB |")
     print("|---" * (len(CORES) + 6) + "|")
