@@ -12,6 +12,7 @@ use std::{
 use bansho::{
     Assets, Image,
     base::{
+        color::VALUES_OF_CODES,
         geometry::{mesh::Mesh, strokes::Drawing},
         host::assets::{AssetError, AssetProblem, DepthMap, Encoding, NormalMap, Picture, PictureAlpha, PictureLayers},
     },
@@ -191,27 +192,22 @@ const TASK_PIXELS: usize = 1 << 13;
 
 /// Encoded values of 0 to 1 of codes, in the pool of the caller and in the memory of earlier ones.
 fn pixels_of_codes(shape: Shape, codes: &[u8], memory: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
-    /// The values of the codes.
-    const VALUES: [f32; 256] = {
-        let mut values = [0.0; 256];
-        let mut code = 0;
-        while code < 256 {
-            values[code] = code as f32 / 255.0;
-            code += 1;
-        }
-        values
-    };
     let mut pixels = resized(memory, shape.height * shape.width, [0.0; 4]);
     let tasks = pixels.par_chunks_mut(TASK_PIXELS).zip(codes.par_chunks(TASK_PIXELS * shape.channels));
     tasks.for_each(|(pixels, codes)| match shape.channels {
         3 => {
             for (pixel, &[r, g, b]) in pixels.iter_mut().zip(codes.as_chunks::<3>().0) {
-                *pixel = [VALUES[usize::from(r)], VALUES[usize::from(g)], VALUES[usize::from(b)], 1.0];
+                *pixel = [
+                    VALUES_OF_CODES[usize::from(r)],
+                    VALUES_OF_CODES[usize::from(g)],
+                    VALUES_OF_CODES[usize::from(b)],
+                    1.0,
+                ];
             }
         }
         _ => {
             for (pixel, rgba) in pixels.iter_mut().zip(codes.as_chunks::<4>().0) {
-                *pixel = rgba.map(|code| VALUES[usize::from(code)]);
+                *pixel = rgba.map(|code| VALUES_OF_CODES[usize::from(code)]);
             }
         }
     });

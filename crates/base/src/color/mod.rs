@@ -22,7 +22,7 @@ pub use blackbody::{BlackBody, black_body};
 pub use display::{
     alpha::{AlphaConvention, AlphaMode},
     quantize::{BitDepth, DisplayCode},
-    transfer::{decode_srgb, decode_srgb8, encode_srgb},
+    transfer::{VALUES_OF_CODES, decode_srgb, decode_srgb8, encode_srgb},
     view::{View, ViewName},
 };
 pub use exposure::{MAX_EV100, ev100_of_camera, ev100_of_white_luminance, exposure_scale, white_luminance};

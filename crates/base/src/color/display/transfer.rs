@@ -58,6 +58,17 @@ pub fn decode_srgb(encoded: f32) -> f32 {
     linear as f32
 }
 
+/// The values, 0 to 1, of 8-bit codes.
+pub const VALUES_OF_CODES: [f32; 256] = {
+    let mut values = [0.0; 256];
+    let mut code = 0;
+    while code < 256 {
+        values[code] = code as f32 / 255.0;
+        code += 1;
+    }
+    values
+};
+
 /// Linear light of an 8-bit sRGB code, from a table.
 #[inline]
 #[must_use]
@@ -69,18 +80,9 @@ pub fn decode_srgb8(code: u8) -> f32 {
 /// [`decode_srgb`], by a table for the values of 8-bit codes.
 #[inline]
 pub(super) fn decode_srgb_code_or_value(value: f32) -> f32 {
-    /// The values of the codes: a comparison instead of a division, which would take longest.
-    const VALUES: [f32; 256] = {
-        let mut values = [0.0; 256];
-        let mut code = 0;
-        while code < 256 {
-            values[code] = code as f32 / 255.0;
-            code += 1;
-        }
-        values
-    };
     let code = (value * 255.0 + 0.5) as u8;
-    if VALUES[usize::from(code)] == value { decode_srgb8(code) } else { decode_srgb(value) }
+    // A comparison with the table instead of a division, which would take longest.
+    if VALUES_OF_CODES[usize::from(code)] == value { decode_srgb8(code) } else { decode_srgb(value) }
 }
 
 #[cfg(test)]
