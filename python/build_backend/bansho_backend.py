@@ -1,4 +1,4 @@
-"""Builds the wheel: maturin, with the program `bansho` among its scripts and the notices of all crates.
+"""Builds the wheel: maturin, with the program `bansho` among its scripts, plates of the example scenes, and the notices of all crates.
 
 | variable | what it sets |
 | --- | --- |
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -23,7 +24,9 @@ from maturin import (
 )
 
 ROOT = Path(__file__).resolve().parents[1]
+# Folders of a wheel: what maturin installs among the scripts, and under the prefix of the environment.
 SCRIPTS = ROOT / "program" / "scripts"
+SCENES = ROOT / "program" / "data" / "share" / "bansho" / "scenes"
 
 
 def _add_program() -> None:
@@ -41,8 +44,23 @@ def _add_program() -> None:
     shutil.copy2(given, SCRIPTS / name)
 
 
+def _add_plates() -> None:
+    """Puts the plates of scenes without auroras where the program looks for them. With those of auroras a wheel would be larger than 20 MB."""
+    shutil.rmtree(SCENES, ignore_errors=True)
+    scenes = ROOT.parent / "scenes"
+    for scene in sorted([*scenes.glob("*.toml"), *scenes.glob("papers/*/*.toml")]):
+        text = scene.read_text(encoding="utf-8")
+        if "[[aurora]]" in text:
+            continue
+        for name in re.findall(r'^(?:image|depth|albedo|normal) = "(plates/[^"]+)"', text, re.MULTILINE):
+            copy = SCENES / scene.parent.relative_to(scenes) / name
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(scene.parent / name, copy)
+
+
 def _prepare() -> None:
     _add_program()
+    _add_plates()
     write_notices()
     profile = os.environ.get("BANSHO_PROFILE")
     if profile:

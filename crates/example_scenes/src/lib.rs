@@ -1,10 +1,18 @@
-//! The example scenes of Bansho as text, with the bytes of the pictures and meshes that they name.
+//! The example scenes of Bansho as text, with the bytes of the meshes that they name.
+//!
+//! Plates (photographs, their depths, albedos and normals) are not in the program. They are looked for in the folder `scenes` of the
+//! installation; see [`plates`].
 //!
 //! ```
 //! let scene = bansho_example_scenes::find("burning_mesh").unwrap();
 //! assert!(scene.text.contains("bansho = "));
-//! assert!(scene.assets().all(|(path, bytes)| path.ends_with(".glb") && !bytes.is_empty()));
+//! let files = scene.read_assets().unwrap();
+//! assert!(files.iter().all(|(path, bytes)| path.ends_with(".glb") && !bytes.is_empty()));
 //! ```
+
+use std::{borrow::Cow, io};
+
+pub mod plates;
 
 /// An example scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +27,33 @@ pub struct ExampleScene {
 
 include!(concat!(env!("OUT_DIR"), "/scenes.rs"));
 
+/// A file of an example cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadAssetError {
+    /// A plate is in no folder where plates are looked for.
+    #[error(
+        "{path}: this plate is not in the program, and not in {}; allowed: the folder `scenes` of a release archive or of the \
+         repository, named by the environment variable {}",
+        plates::searched_folders(),
+        plates::FOLDER_VARIABLE
+    )]
+    NotFound {
+        /// The path that the scene names.
+        path: String,
+    },
+    /// A plate was found and cannot be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: String,
+        /// Why it cannot be read.
+        source: io::Error,
+    },
+}
+
+/// A file that a scene names: its path relative to the scene, and its contents.
+pub type SceneFile = (&'static str, Cow<'static, [u8]>);
+
 impl ExampleScene {
     /// The first sentence of the comment at its beginning.
     pub fn summary(&self) -> String {
@@ -31,8 +66,11 @@ impl ExampleScene {
     }
 
     /// The files that it names: paths relative to the scene, and contents.
-    pub fn assets(&self) -> impl Iterator<Item = (&'static str, &'static [u8])> {
-        self.asset_paths.iter().filter_map(|path| Some((*path, asset(path)?)))
+    ///
+    /// # Errors
+    /// A plate is not found, or cannot be read.
+    pub fn read_assets(&self) -> Result<Vec<SceneFile>, ReadAssetError> {
+        self.asset_paths.iter().map(|path| Ok((*path, read_asset(path)?))).collect()
     }
 }
 
@@ -41,9 +79,21 @@ pub fn find(name: &str) -> Option<&'static ExampleScene> {
     SCENES.iter().find(|scene| scene.name == name)
 }
 
-/// The contents of a file that a scene names, by its path relative to the scene. Two scenes that name the same path name equal files.
-pub fn asset(path: &str) -> Option<&'static [u8]> {
-    ASSETS.iter().find(|(own, _)| *own == path).map(|(_, bytes)| *bytes)
+/// The contents of a file that a scene names and that is in the program, by its path relative to the scene. Two scenes that name the
+/// same path name equal files.
+pub fn embedded_asset(path: &str) -> Option<&'static [u8]> {
+    ASSETS.iter().find(|(named, _)| *named == path).map(|(_, bytes)| *bytes)
+}
+
+/// The contents of a file that a scene names, by its path relative to the scene: from the program, or from a folder of [`plates`].
+///
+/// # Errors
+/// It is not in the program, and is no plate that is found and can be read.
+pub fn read_asset(path: &str) -> Result<Cow<'static, [u8]>, ReadAssetError> {
+    match embedded_asset(path) {
+        Some(bytes) => Ok(Cow::Borrowed(bytes)),
+        None => plates::read(path).map(Cow::Owned),
+    }
 }
 
 #[cfg(test)]
@@ -55,8 +105,22 @@ mod tests {
         assert!(SCENES.len() > 30);
         for scene in SCENES {
             assert!(scene.summary().len() > 10, "{}: {:?}", scene.name, scene.summary());
-            assert_eq!(scene.assets().count(), scene.asset_paths.len(), "{}", scene.name);
+            let files = scene.read_assets().unwrap();
+            assert!(files.len() == scene.asset_paths.len() && files.iter().all(|(_, bytes)| !bytes.is_empty()));
         }
         assert!(find("campfire").is_some() && find("campfires").is_none());
+    }
+
+    #[test]
+    fn plates_are_not_in_the_program() {
+        let embedded: usize = ASSETS.iter().map(|(_, bytes)| bytes.len()).sum();
+        assert!(embedded < 300_000, "{embedded} bytes are embedded");
+        assert!(embedded_asset("plates/hearth.jpg").is_none() && plates::path_in_scenes("plates/hearth.jpg").is_some());
+    }
+
+    #[test]
+    fn a_file_of_no_scene_is_not_found() {
+        let error = read_asset("plates/../../secret").unwrap_err();
+        assert!(error.to_string().starts_with("plates/../../secret: this plate is not in the program"), "{error}");
     }
 }

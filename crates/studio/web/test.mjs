@@ -271,6 +271,24 @@ const lit = await until(plated, picture, ({ mean }) => mean > 4 * dark.mean, "no
 console.log(`before a plate: mean ${lit.mean.toFixed(1)}, alone ${dark.mean.toFixed(1)}`);
 await plated.close();
 
+// The plate of an example lies beside the page, and is fetched before anything is drawn.
+const answers = [];
+const hearth = await open("hearth", async (page) => {
+  page.on("response", (response) => response.url().includes("/scenes/plates/") && answers.push(response.status()));
+});
+await until(hearth, picture, isDrawn, "no picture of a fire in a hearth");
+if (answers.length !== 2 || answers.some((status) => status !== 200)) fail(`the plates of the hearth: ${answers}`);
+const faults = await hearth.evaluate(() => document.getElementById("notice").textContent);
+if (faults !== "") fail(`with its plates the page says: ${faults}`);
+await hearth.close();
+// A page without plates says so. Its context is not among those whose console must stay silent.
+const bare = await (await browser.newContext({ viewport: SIZE })).newPage();
+await bare.route("**/scenes/plates/*", (route) => route.fulfill({ status: 404 }));
+await bare.goto(`${address}#hearth`);
+await bare.waitForFunction(() => /plates.*answers 404/.test(document.getElementById("notice").textContent), null, { timeout: 20000 });
+await bare.close();
+console.log("the plate of an example is fetched, and a page that has none says so");
+
 // A panic is told once, and another worker goes on. No scene panics, so the words are put into the worker's mouth: its last
 // ones, and then the trap.
 const panicking = await open("torch", (page) => page.addInitScript(() => {

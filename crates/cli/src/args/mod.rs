@@ -1,4 +1,4 @@
-//! The command line.
+//! The command line: the commands with their options, parsed by `clap`.
 
 mod farm;
 mod flipbook;

@@ -10,7 +10,7 @@ use bansho::{
     scene::template,
 };
 
-use bansho_example_scenes::{ExampleScene, SCENES};
+use bansho_example_scenes::{ExampleScene, SCENES, SceneFile};
 
 use crate::{
     args::NewArgs,
@@ -31,8 +31,10 @@ pub(crate) fn run(args: &NewArgs) -> anyhow::Result<()> {
     match args.from.as_deref().map(find).transpose()? {
         None => atomic::write_new(&path, text(kind(args.kind.as_deref())?, args.all).as_bytes())?,
         Some(example) => {
+            // Before anything is written: a scene without its plates could not be drawn.
+            let assets = example.read_assets()?;
             atomic::write_new(&path, example.text.as_bytes())?;
-            copy_assets(example, path.parent().unwrap_or(Path::new("")))?;
+            write_assets(&assets, path.parent().unwrap_or(Path::new("")))?;
         }
     }
     let shown = path.display().to_string();
@@ -73,8 +75,8 @@ fn with_extension(name: &Path) -> PathBuf {
 }
 
 /// Writes the files that an example names. Existing files are kept.
-fn copy_assets(example: &ExampleScene, folder: &Path) -> anyhow::Result<()> {
-    for (path, bytes) in example.assets() {
+fn write_assets(assets: &[SceneFile], folder: &Path) -> anyhow::Result<()> {
+    for (path, bytes) in assets {
         match atomic::write_new(&folder.join(path), bytes) {
             Err(MediaError::AlreadyExists { .. }) => {}
             written => written?,

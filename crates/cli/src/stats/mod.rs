@@ -1,6 +1,6 @@
-//! `--stats`: the time spent in each stage, and in each phenomenon. With one frame at a time it is measured by the clock, so that the stages add up to what a user
-//! waits for. With several frames in flight stages overlap, and their times by the clock would include those of others, for which a thread works while it waits;
-//! so they are processor time.
+//! `--stats`: the time spent in each stage, and in each phenomenon. With one frame at a time it is elapsed time, so that the stages add up to the time that a
+//! user waits. With several frames in flight it is processor time: stages overlap then, and a thread that waits for its stage works on others meanwhile, whose
+//! time the elapsed time of that stage would include.
 
 mod parts;
 

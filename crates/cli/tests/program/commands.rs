@@ -57,6 +57,18 @@ fn every_example_can_be_copied_and_passes_the_check() {
 }
 
 #[test]
+fn an_example_whose_plate_is_not_found_writes_nothing() {
+    let folder = Folder::new();
+    let mut command = folder.command(&["new", "fire", "--from", "hearth"]);
+    let output = command.env("BANSHO_SCENES", folder.path("gone")).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.starts_with("error: plates/hearth.jpg: this plate is not in the program, and not in "), "{error}");
+    assert!(error.contains("/gone`") && error.contains("BANSHO_SCENES") && error.lines().count() == 1, "{error}");
+    assert!(folder.names().is_empty());
+}
+
+#[test]
 fn an_unknown_example_is_an_error_and_writes_nothing() {
     let folder = Folder::new();
     let run = folder.run(&["new", "fire", "--from", "volcano"]);

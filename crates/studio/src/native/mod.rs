@@ -1,4 +1,4 @@
-//! The native program.
+//! The native program `bansho-studio`: its arguments, and its window by a GPU or in software.
 
 use std::{
     io::Write,

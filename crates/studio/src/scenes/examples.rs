@@ -1,6 +1,8 @@
-//! Assets in memory: the files of the example scenes, embedded in the program, and files that the user added.
+//! The files of the example scenes, embedded in the program or beside it, and files that the user added.
 
-use std::{path::Path, sync::Arc};
+use std::{borrow::Cow, path::Path, sync::Arc};
+
+use bansho_example_scenes::plates;
 
 use bansho::{
     Assets, MemoryAssets,
@@ -16,7 +18,7 @@ use bansho::{
     },
 };
 
-/// The embedded files, and files added by the user.
+/// The files of the example scenes, and files added by the user. In a web page, plates of the examples are added once they are fetched.
 #[derive(Clone, Debug, Default)]
 pub struct BundledAssets {
     added_files: Vec<(String, Arc<[u8]>)>,
@@ -35,13 +37,25 @@ impl BundledAssets {
         &self.added_files
     }
 
-    /// The bytes of the file `name`, if it is embedded or was added.
-    pub fn bytes(&self, name: &str) -> Option<&[u8]> {
-        let added = self.added_files.iter().find(|(added, _)| added == name).map(|(_, bytes)| bytes.as_ref());
-        added.or_else(|| bansho_example_scenes::asset(name))
+    fn added_file(&self, name: &str) -> Option<&[u8]> {
+        self.added_files.iter().find(|(added, _)| added == name).map(|(_, bytes)| bytes.as_ref())
     }
 
-    fn require(&self, name: &str) -> Result<&[u8], AssetError> {
+    /// Whether there is a file `name`.
+    pub fn contains(&self, name: &str) -> bool {
+        let is_embedded = bansho_example_scenes::embedded_asset(name).is_some();
+        is_embedded || self.added_file(name).is_some() || plates::find(name).is_some()
+    }
+
+    /// The bytes of the file `name`, if there is one.
+    pub fn bytes(&self, name: &str) -> Option<Cow<'_, [u8]>> {
+        match self.added_file(name) {
+            Some(bytes) => Some(Cow::Borrowed(bytes)),
+            None => bansho_example_scenes::read_asset(name).ok(),
+        }
+    }
+
+    fn require(&self, name: &str) -> Result<Cow<'_, [u8]>, AssetError> {
         self.bytes(name).ok_or_else(|| error(name, AssetProblem::Missing))
     }
 
@@ -59,7 +73,7 @@ pub struct OverlayAssets {
 
 impl OverlayAssets {
     fn source(&self, name: &str) -> &dyn Assets {
-        if self.bundle.bytes(name).is_some() { &self.bundle } else { self.files.as_ref() }
+        if self.bundle.contains(name) { &self.bundle } else { self.files.as_ref() }
     }
 }
 
@@ -111,43 +125,46 @@ impl Assets for BundledAssets {
     }
 
     fn picture_layers(&self, path: &str, _frame: i64, layers: &PictureLayers) -> Result<Arc<Picture>, AssetError> {
-        let picture = decode_picture(self.require(path)?, extension(path), layers, MemoryLimit::default());
+        let picture = decode_picture(&self.require(path)?, extension(path), layers, MemoryLimit::default());
         picture.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn depth(&self, path: &str, _frame: i64, layer: Option<&str>) -> Result<Arc<DepthMap>, AssetError> {
-        let depth = decode_depth(self.require(path)?, extension(path), layer, MemoryLimit::default());
+        let depth = decode_depth(&self.require(path)?, extension(path), layer, MemoryLimit::default());
         depth.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn normals(&self, path: &str, _frame: i64) -> Result<Arc<NormalMap>, AssetError> {
-        let normals = decode_normals(self.require(path)?, extension(path), MemoryLimit::default());
+        let normals = decode_normals(&self.require(path)?, extension(path), MemoryLimit::default());
         normals.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn mesh(&self, path: &str) -> Result<Arc<Mesh>, AssetError> {
         let bytes = self.require(path)?;
         let mesh = decode_mesh(
-            bytes,
+            &bytes,
             extension(path),
             // Buffers in files of their own; the limit of their size is for files from elsewhere.
-            &|name, _| self.require(name).map(<[u8]>::to_vec).map_err(|error| error.problem),
+            &|name, _| self.require(name).map(Cow::into_owned).map_err(|error| error.problem),
             MemoryLimit::default(),
         );
         mesh.map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn drawing(&self, path: &str) -> Result<Arc<Drawing>, AssetError> {
-        decode_drawing(self.require(path)?).map(Arc::new).map_err(|problem| error(path, problem))
+        decode_drawing(&self.require(path)?).map(Arc::new).map_err(|problem| error(path, problem))
     }
 
     fn text(&self, path: &str) -> Result<Arc<str>, AssetError> {
-        let text = std::str::from_utf8(self.require(path)?);
+        let bytes = self.require(path)?;
+        let text = std::str::from_utf8(&bytes);
         text.map(Arc::from).map_err(|_| error(path, AssetProblem::Damaged("it is not UTF-8".into())))
     }
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
-        self.require(path)?;
+        if !self.contains(path) {
+            return Err(error(path, AssetProblem::Missing));
+        }
         // The name suffices: within a process its content never changes, unless a file is added, which creates a new bundle.
         let mut named = MemoryAssets::default();
         named.insert_text(path, "");
@@ -171,6 +188,14 @@ mod tests {
         }
         let scene = bansho_example_scenes::find("inagaki_haze").unwrap();
         assert!(check(scene.name, scene.text, &assets).is_ok());
+    }
+
+    #[test]
+    fn a_plate_of_an_example_is_missing_until_it_is_fetched() {
+        let mut bundle = BundledAssets::default();
+        bundle.add_file("plates/fetched.jpg", *b"a picture");
+        assert!(bundle.contains("plates/hearth.jpg") && !bundle.contains("plates/gone.jpg"));
+        assert_eq!(bundle.bytes("plates/fetched.jpg").as_deref(), Some(&b"a picture"[..]));
     }
 
     #[test]

@@ -8,10 +8,13 @@ pub(crate) mod settings_store;
 pub(crate) mod status;
 
 use std::{
+    borrow::Cow,
     path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
 };
+
+use bansho_example_scenes::plates;
 
 use bansho::{
     Assets, Plan,
@@ -23,7 +26,7 @@ use bansho::{
 };
 
 use crate::{
-    document::{Document, PhenomenonId, Revision, keyframes},
+    document::{Document, PhenomenonId, Revision, descriptors::named_files, keyframes},
     player::{Event, FrameRequest, FrameTiming, Picture, Player, PreviewScale, Transport},
     scenes::examples::BundledAssets,
 };
@@ -58,6 +61,8 @@ pub struct Session {
     pub stages: Option<PhenomenonId>,
     /// Whether to autosave at once.
     pub autosave_now: bool,
+    /// Whether files of the scene are on their way. No picture is requested before they have arrived.
+    pub awaits_files: bool,
     player: Box<dyn Player>,
     assets_for_folder: AssetsForFolder,
     bundle: BundledAssets,
@@ -107,6 +112,7 @@ impl Session {
             draft: true,
             stages: None,
             autosave_now: false,
+            awaits_files: false,
             stage_pictures: Vec::new(),
             player,
             assets_for_folder,
@@ -333,7 +339,7 @@ impl Session {
             // While interactive, a frame is not drawn again only because its size changed.
             last == LastRequest { within: if interactive { last.within } else { next.within }, ..next }
         });
-        if is_same || self.has_panicked() {
+        if is_same || self.awaits_files || self.has_panicked() {
             return;
         }
         self.last_request = Some(next);
@@ -367,8 +373,14 @@ impl Session {
     }
 
     /// The bytes of a bundled or added file.
-    pub fn bundled_file(&self, name: &str) -> Option<&[u8]> {
+    pub fn bundled_file(&self, name: &str) -> Option<Cow<'_, [u8]>> {
         self.bundle.bytes(name)
+    }
+
+    /// Plates of the example scenes that the scene names and that are not here, by the names in the scene. A web page fetches them.
+    pub fn missing_plates(&self) -> Vec<String> {
+        let names = named_files(self.document.values()).into_iter().map(|reference| reference.file);
+        names.filter(|name| plates::path_in_scenes(name).is_some() && !self.bundle.contains(name)).collect()
     }
 
     /// Added files, by name.

@@ -1,4 +1,4 @@
-//! `bansho farm`
+//! `bansho farm`: plans jobs for batch systems, runs their tasks, and reports their state.
 
 mod arguments;
 mod journal;

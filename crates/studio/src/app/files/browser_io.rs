@@ -1,4 +1,4 @@
-//! Browser file access: the file chooser, dropped files, and downloads.
+//! Browser file access: the file chooser, dropped files, files that lie beside the page, and downloads.
 
 use std::{
     cell::RefCell,
@@ -9,7 +9,7 @@ use std::{
 use eframe::egui::{Context, DroppedFileHandle};
 use wasm_bindgen::{JsCast, JsValue, closure::Closure};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
-use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
+use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Response, Url};
 
 /// A file that was chosen or dropped.
 pub(super) struct ReceivedFile {
@@ -51,6 +51,35 @@ pub(super) fn receive_dropped(file: DroppedFileHandle, inbox: &Inbox, ctx: &Cont
             ctx.request_repaint();
         }
     });
+}
+
+/// A file that lies beside the page.
+pub(super) struct FetchedFile {
+    pub(super) name: String,
+    /// Its content, or why there is none.
+    pub(super) bytes: Result<Vec<u8>, String>,
+}
+
+/// Fetches the file at `url`, relative to the page. It is added to `fetched` as `name` once it is here, or cannot be had.
+pub(super) fn fetch(url: String, name: String, fetched: &Rc<RefCell<Vec<FetchedFile>>>, ctx: &Context) {
+    let (fetched, ctx) = (fetched.clone(), ctx.clone());
+    spawn_local(async move {
+        let bytes =
+            bytes_at(&url).await.unwrap_or_else(|_| Err(format!("{url}: the server of the page does not answer")));
+        fetched.borrow_mut().push(FetchedFile { name, bytes });
+        ctx.request_repaint();
+    });
+}
+
+/// The content of the file at `url`, or what the server says instead.
+async fn bytes_at(url: &str) -> Result<Result<Vec<u8>, String>, JsValue> {
+    let window = web_sys::window().ok_or_else(|| JsValue::from_str("there is no window"))?;
+    let response: Response = JsFuture::from(window.fetch_with_str(url)).await?.dyn_into()?;
+    if !response.ok() {
+        return Ok(Err(format!("{url}: the server of the page answers {}", response.status())));
+    }
+    let buffer = JsFuture::from(response.array_buffer()?).await?;
+    Ok(Ok(js_sys::Uint8Array::new(&buffer).to_vec()))
 }
 
 /// The content of a file in the memory of the browser, since WebAssembly memory is small.

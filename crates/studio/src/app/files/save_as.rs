@@ -47,7 +47,7 @@ pub(super) fn with_moved_paths(session: &Session, to: &Path) -> Result<Arc<str>,
         }
         let bundled_file = if session.path.is_none() { session.bundled_file(&name) } else { None };
         let new = match bundled_file {
-            Some(bytes) => write_bundled_file(&name, bytes, &after)?,
+            Some(bytes) => write_bundled_file(&name, &bytes, &after)?,
             None => path_from_new_folder(&name, &before, &after),
         };
         if new != name {

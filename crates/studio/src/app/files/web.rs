@@ -1,6 +1,8 @@
-//! Files in a web page: chosen or dropped by the user, and saved as downloads.
+//! Files in a web page: chosen or dropped by the user, plates that lie beside the page, and downloads.
 
-use std::path::Path;
+use std::{cell::RefCell, collections::BTreeSet, path::Path, rc::Rc};
+
+use bansho_example_scenes::plates;
 
 use bansho::{
     media::{files::naming, zip::ZipWriter},
@@ -9,11 +11,12 @@ use bansho::{
 
 use super::{
     Files,
-    browser_io::{self, BlobParts, Inbox, ReceivedFile},
+    browser_io::{self, BlobParts, FetchedFile, Inbox, ReceivedFile},
     questions::PendingAction,
     report_end,
 };
 use crate::{
+    document::Revision,
     player::{Event, FrameRequest, Player, WorkerPlayer, render_job::JobFailure},
     session::{Session, selection::Selection, settings_store::SettingsStore},
 };
@@ -23,9 +26,55 @@ use eframe::egui::{Context, Ui};
 pub(super) struct PlatformFiles {
     /// Files that were chosen or dropped.
     inbox: Inbox,
+    plates: PlateFetches,
     /// The parameter that is set to the next received file.
     relink: Option<ValuePath>,
     rendering: Option<Rendering>,
+}
+
+/// Plates of the example scenes, which lie in the folder `scenes` beside the page. They are fetched once a scene names them.
+#[derive(Default)]
+struct PlateFetches {
+    /// The scene that was last searched for plates: number of the opened document, and revision.
+    searched: Option<(u64, Revision)>,
+    /// Names of the plates that this document asked for.
+    requested: BTreeSet<String>,
+    /// Number of plates that are on their way.
+    pending: usize,
+    fetched: Rc<RefCell<Vec<FetchedFile>>>,
+}
+
+impl PlateFetches {
+    /// Adds plates that have arrived to the session, and asks for those that the scene names and that are not there.
+    fn poll(&mut self, ctx: &Context, session: &mut Session) {
+        for FetchedFile { name, bytes } in self.fetched.take() {
+            self.pending -= 1;
+            match bytes {
+                Ok(bytes) => session.add_file(&name, bytes),
+                Err(reason) => session.set_notice(Some(reason)),
+            }
+        }
+        let scene = Some((session.opened, session.document.revision()));
+        if self.searched != scene {
+            if self.searched.map(|(opened, _)| opened) != Some(session.opened) {
+                // Another document may ask again for what could not be had.
+                self.requested.clear();
+            }
+            self.searched = scene;
+            self.request_missing(ctx, session);
+        }
+        session.awaits_files = self.pending > 0;
+    }
+
+    fn request_missing(&mut self, ctx: &Context, session: &Session) {
+        for name in session.missing_plates() {
+            let Some(path) = plates::path_in_scenes(&name) else { continue };
+            if self.requested.insert(name.clone()) {
+                browser_io::fetch(format!("scenes/{path}"), name, &self.fetched, ctx);
+                self.pending += 1;
+            }
+        }
+    }
 }
 
 /// Full-quality rendering, in a worker of its own, so that the preview stays live.
@@ -43,7 +92,7 @@ struct Rendering {
 
 impl PlatformFiles {
     pub(super) fn new(_store: &SettingsStore) -> Self {
-        Self { inbox: Inbox::default(), relink: None, rendering: None }
+        Self { inbox: Inbox::default(), plates: PlateFetches::default(), relink: None, rendering: None }
     }
 }
 
@@ -155,6 +204,7 @@ impl Files {
     /// Handles received files: a scene is opened, other files are added to the open scene.
     pub(super) fn poll_platform(&mut self, ui: &Ui, session: &mut Session, selection: &Selection) {
         self.poll_rendering(session);
+        self.platform.plates.poll(ui.ctx(), session);
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
         dropped.into_iter().for_each(|file| browser_io::receive_dropped(file, &self.platform.inbox, ui.ctx()));
         for ReceivedFile { name, bytes } in self.platform.inbox.take() {
