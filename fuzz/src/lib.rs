@@ -177,7 +177,7 @@ pub fn read_profile(profile: &[u8]) {
     let file = [&b"II*\0\x08\0\0\0\x09\0"[..], &entries.concat(), &[0; 4], &pixels, profile].concat();
     telling_panics(|| {
         if let Ok(picture) = decode_picture(&file, "tiff", &PictureLayers::default(), limits::MemoryLimit::default()) {
-            assert!(picture.color.pixels().as_flattened().iter().all(|value| (0.0..=1.0).contains(value)));
+            assert!(picture.color.iter().flatten().all(|value| (0.0..=1.0).contains(&value)));
         }
     });
 }

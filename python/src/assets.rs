@@ -12,9 +12,11 @@ use std::{
 use bansho::{
     Assets, Image,
     base::{
-        color::VALUES_OF_CODES,
         geometry::{mesh::Mesh, strokes::Drawing},
-        host::assets::{AssetError, AssetProblem, DepthMap, Encoding, NormalMap, Picture, PictureAlpha, PictureLayers},
+        host::{
+            assets::{AssetError, AssetProblem, DepthMap, Encoding, NormalMap, Picture, PictureAlpha, PictureLayers},
+            picture_pixels::{CodeImage, PicturePixels},
+        },
     },
     media::assets::FileAssets,
 };
@@ -78,11 +80,14 @@ impl ArrayAssets {
         self.stores.write().unwrap_or_else(PoisonError::into_inner).pictures.insert(name.to_owned(), stored);
     }
 
-    /// Takes away the pictures of `name`. Returns the memory of the first, if nothing else refers to it.
-    pub(crate) fn take_picture_memory(&self, name: &str) -> Vec<[f32; 4]> {
+    /// Takes away the pictures of `name`. Returns the memory of the first, if it is of codes and nothing else refers to it.
+    pub(crate) fn take_picture_memory(&self, name: &str) -> Vec<[u8; 4]> {
         let stored = self.stores.write().unwrap_or_else(PoisonError::into_inner).pictures.remove(name);
         let first = stored.and_then(|stored| Arc::into_inner(stored.into_iter().next()?.content));
-        first.map_or_else(Vec::new, |picture| picture.color.into_pixels())
+        match first.map(|picture| picture.color) {
+            Some(PicturePixels::Codes(codes)) => codes.into_pixels(),
+            _ => Vec::new(),
+        }
     }
 
     /// Takes away the depths of `name`. Returns the memory of the first, if nothing else refers to it.
@@ -148,7 +153,7 @@ impl Assets for ArrayAssets {
     fn normals(&self, path: &str, frame: i64) -> Result<Arc<NormalMap>, AssetError> {
         let Some(stored) = self.stored_picture(path, frame) else { return self.files.normals(path, frame) };
         let color = &stored?.content.color;
-        let pixels = color.pixels().iter().map(|&[x, y, z, _]| [x, y, z]).collect();
+        let pixels = color.iter().map(|[x, y, z, _]| [x, y, z]).collect();
         let values = Image::from_pixels(color.width(), color.height(), pixels);
         let missing = || AssetError { path: path.to_owned(), problem: AssetProblem::NoChannel("X".into()) };
         Ok(Arc::new(NormalMap { values: values.ok_or_else(missing)?, remarks: Vec::new() }))
@@ -183,33 +188,25 @@ pub(crate) fn codes_of<'a>(codes: &'a PyReadonlyArray3<u8>) -> PyResult<(Shape, 
 }
 
 /// A picture of sRGB codes in rows, in the pool of the caller and in the memory of an earlier one; alpha is straight and blends encoded values.
-pub(crate) fn picture_of_codes((shape, codes): (Shape, &[u8]), memory: Vec<[f32; 4]>) -> PyResult<Picture> {
-    picture(shape, pixels_of_codes(shape, codes, memory), Encoding::DisplaySrgb)
+pub(crate) fn picture_of_codes((shape, codes): (Shape, &[u8]), memory: Vec<[u8; 4]>) -> PyResult<Picture> {
+    let color = CodeImage::from_pixels(shape.width, shape.height, pixels_of_codes(shape, codes, memory));
+    picture(shape, color, Encoding::DisplaySrgb)
 }
 
-/// Pixels that a task converts.
+/// Pixels that a task copies or converts.
 const TASK_PIXELS: usize = 1 << 13;
 
-/// Encoded values of 0 to 1 of codes, in the pool of the caller and in the memory of earlier ones.
-fn pixels_of_codes(shape: Shape, codes: &[u8], memory: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
-    let mut pixels = resized(memory, shape.height * shape.width, [0.0; 4]);
+/// Codes with alpha, in the pool of the caller and in the memory of earlier ones.
+fn pixels_of_codes(shape: Shape, codes: &[u8], memory: Vec<[u8; 4]>) -> Vec<[u8; 4]> {
+    let mut pixels = resized(memory, shape.height * shape.width, [0; 4]);
     let tasks = pixels.par_chunks_mut(TASK_PIXELS).zip(codes.par_chunks(TASK_PIXELS * shape.channels));
     tasks.for_each(|(pixels, codes)| match shape.channels {
         3 => {
             for (pixel, &[r, g, b]) in pixels.iter_mut().zip(codes.as_chunks::<3>().0) {
-                *pixel = [
-                    VALUES_OF_CODES[usize::from(r)],
-                    VALUES_OF_CODES[usize::from(g)],
-                    VALUES_OF_CODES[usize::from(b)],
-                    1.0,
-                ];
+                *pixel = [r, g, b, u8::MAX];
             }
         }
-        _ => {
-            for (pixel, rgba) in pixels.iter_mut().zip(codes.as_chunks::<4>().0) {
-                *pixel = rgba.map(|code| VALUES_OF_CODES[usize::from(code)]);
-            }
-        }
+        _ => pixels.copy_from_slice(codes.as_chunks::<4>().0),
     });
     pixels
 }
@@ -230,11 +227,11 @@ pub(crate) fn picture_of_floats(values: &PyReadonlyArray3<f32>, encoding: Encodi
         3 => values.as_chunks::<3>().0.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect(),
         _ => values.as_chunks::<4>().0.to_vec(),
     };
-    picture(shape, pixels, encoding)
+    picture(shape, Image::from_pixels(shape.width, shape.height, pixels), encoding)
 }
 
-pub(crate) fn picture(shape: Shape, pixels: Vec<[f32; 4]>, encoding: Encoding) -> PyResult<Picture> {
-    let color = Image::from_pixels(shape.width, shape.height, pixels);
+/// A picture of pixels, of which there are as many as the shape says.
+fn picture(shape: Shape, color: Option<impl Into<PicturePixels>>, encoding: Encoding) -> PyResult<Picture> {
     let color = color.ok_or_else(|| error::value("an image without pixels".to_owned()))?;
     let mut picture = Picture::opaque(color, encoding);
     if shape.channels == 4 {

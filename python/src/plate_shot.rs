@@ -59,7 +59,7 @@ enum Source<'a> {
 
 impl Source<'_> {
     /// The picture, in the memory of an earlier one.
-    fn picture(self, memory: Vec<[f32; 4]>) -> PyResult<Picture> {
+    fn picture(self, memory: Vec<[u8; 4]>) -> PyResult<Picture> {
         match self {
             Self::Codes(codes) => assets::picture_of_codes(codes, memory),
             Self::Picture(picture) => Ok(picture),

@@ -53,7 +53,7 @@
 //! | parameters of a phenomenon | [`FlameSheetParameters`], [`FlameParticlesParameters`], [`FlameVolumeParameters`], [`RainParameters`], [`AuroraParameters`]; their tables in [`fire`], [`rain`], [`aurora`] |
 //! | camera, wind, air, sky, ground, lamps, obstacles, fog | [`CameraParameters`], [`WindParameters`], [`Air`], [`SkyParameters`], [`GroundParameters`], [`LightParameters`], [`ObstacleParameters`], [`FogParameters`] |
 //! | values that change over time | [`Animated`] |
-//! | pixels, depth, AOVs | [`Picture`]; for whole frames [`write_rgba16f`] and its kin |
+//! | pixels, depth, AOVs | [`Picture`]; for whole frames [`write_rgba16f`] and similar functions |
 //! | light for other objects, particles, drops | [`LiveEffect::lights`], [`LiveEffect::particles`] |
 //! | statistics of pictures of flames | [`flame_statistics`] |
 //! | streak textures of any drop | [`rain::billboards::texture::StreakCube`] |

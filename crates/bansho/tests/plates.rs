@@ -62,9 +62,7 @@ fn an_exr_that_bansho_wrote_comes_back_bit_for_bit() {
     let again = over(first.clone(), "");
     assert!(!again.opaque);
     let second = bytes(&again);
-    let bits = |picture: &Picture| {
-        picture.color.pixels().as_flattened().iter().map(|value| value.to_bits()).collect::<Vec<_>>()
-    };
+    let bits = |picture: &Picture| picture.color.iter().flat_map(|pixel| pixel.map(f32::to_bits)).collect::<Vec<_>>();
     assert_eq!(bits(&first), bits(&second));
 }
 

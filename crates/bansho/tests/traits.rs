@@ -98,7 +98,7 @@ fn a_plate_through_an_empty_scene_is_unchanged_to_the_byte() {
     let codes: Vec<[u8; 4]> = {
         use bansho_base::host::assets::Assets;
         let picture = assets.picture("plate.png", 0).unwrap();
-        picture.color.pixels().iter().map(|p| p.map(|value| (value * 255.0).round() as u8)).collect()
+        picture.color.iter().map(|p| p.map(|value| (value * 255.0).round() as u8)).collect()
     };
     let text = format!("{CAMERA}[plate]\nimage = \"plate.png\"\n");
     let plan = plan_with(&text, &PlanOptions::default(), Arc::new(assets));

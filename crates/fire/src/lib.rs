@@ -4,11 +4,11 @@
 //! |---|---|---|
 //! | [`sheet`] | a small, near flame as a warped, scrolling texture in closed form; with smoke | Ohshima and Itahashi |
 //! | [`particles`] | burning gas by smoothed-particle hydrodynamics, black-body light, heat haze | Inagaki et al. |
-//! | [`volume`] | burning gas on a grid: thin sheets of soot that neck, roll and puff, seen from any side | Burke and Schumann; Nguyen, Fedkiw and Jensen; and others |
+//! | [`volume`] | burning gas on a grid: thin layers of soot that neck, roll up and puff, seen from any side | Burke and Schumann; Nguyen, Fedkiw and Jensen; and others |
 //! | [`sparks`] | glowing particles in closed form, drawn as streaks | |
 //!
 //! The sheet is a closed form, which can be evaluated at any time; the other two are simulated in steps. The volume flame takes the surfaces of its burners from
-//! the particle flame; nothing else is shared. Each module's page lists
+//! the particle flame; nothing else is shared. The documentation of each module lists
 //! its references and its equations with the functions that implement them.
 
 pub mod particles;

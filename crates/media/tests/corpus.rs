@@ -106,7 +106,7 @@ impl Case {
         if let Some(encoding) = self.text("encoding") {
             equal("encoding", is_linear, encoding == "linear")?;
         }
-        let values: Vec<f64> = picture.color.pixels().as_flattened().iter().map(|value| f64::from(*value)).collect();
+        let values: Vec<f64> = picture.color.iter().flatten().map(f64::from).collect();
         if let Some(expected) = self.numbers("values").or_else(|| self.values_of_suite()) {
             near(&values, &expected, self.expected["tolerance"].as_f64().unwrap())?;
         }

@@ -14,7 +14,7 @@ use bansho_base::{
 use crate::{
     crossfade::CrossfadeRun,
     fingerprint::{self, Fingerprint},
-    plate_boxes::{PlateBoxes, PlateBoxesCache, PlateBoxesKey},
+    plate_boxes::{BoxViewsCache, BoxViewsKey, PixelView, PlateBoxes, PlateBoxesCache, PlateBoxesKey},
 };
 use bansho_scene::{Instance, PlateSky, Scene, SceneError, SharedInstance};
 
@@ -31,6 +31,7 @@ pub struct CompiledScene {
     /// The enabled phenomena in the order of the scene, then those that draw its shared tables.
     enabled: Vec<BuiltPhenomenon>,
     plate_boxes: Arc<PlateBoxesCache>,
+    box_views: Arc<BoxViewsCache>,
 }
 
 /// A phenomenon, with the fingerprint of all that it was built from.
@@ -109,7 +110,8 @@ impl CompiledScene {
         let enabled = phenomena.chain(drawn_tables(&scene, assets.as_ref(), &shared, previous)).collect();
         let wind = Wind::new(scene.wind.clone(), scene.seed, scene.loop_s);
         let plate_boxes = previous.map(|previous| previous.plate_boxes.clone()).unwrap_or_default();
-        Ok(Self { wind, shared, built, enabled, scene, assets, plate_boxes })
+        let box_views = previous.map(|previous| previous.box_views.clone()).unwrap_or_default();
+        Ok(Self { wind, shared, built, enabled, scene, assets, plate_boxes, box_views })
     }
 
     /// The image of the plate in the first frame; `None` without a plate, or if it cannot be read.
@@ -127,6 +129,15 @@ impl CompiledScene {
         };
         let key = PlateBoxesKey { digest, alpha, view };
         Some(self.plate_boxes.get_or_compute(key, || PlateBoxes::new(&picture, alpha, &view)))
+    }
+
+    /// Where the camera sees the boxes of the plate, computed by `compute` if that is not known.
+    pub(crate) fn box_views(
+        &self,
+        key: BoxViewsKey,
+        compute: impl FnOnce() -> Vec<Option<PixelView>>,
+    ) -> Arc<Vec<Option<PixelView>>> {
+        self.box_views.get_or_compute(key, compute)
     }
 
     /// Where the boxes of the plate are kept, if frame `number` shows them and no other sky lights the scene.

@@ -6,6 +6,7 @@ use std::{
 };
 
 use bansho_base::{
+    camera::Camera,
     color,
     host::{
         assets::{Encoding, Picture, PictureAlpha},
@@ -44,8 +45,6 @@ pub(crate) struct PlateBox {
     pub(crate) center: [usize; 2],
     /// Number of its pixels.
     pub(crate) pixels: usize,
-    /// Their mean light.
-    pub(crate) light: [f32; 3],
 }
 
 impl PlateBoxes {
@@ -91,17 +90,18 @@ impl PlateBoxes {
         let columns = self.size[0].div_ceil(self.side);
         let from = [index % columns, index / columns].map(|step| step * self.side);
         let sides = [0, 1].map(|axis| self.side.min(self.size[axis] - from[axis]));
-        PlateBox {
-            center: [0, 1].map(|axis| from[axis] + sides[axis] / 2),
-            pixels: sides[0] * sides[1],
-            light: self.light[index],
-        }
+        PlateBox { center: [0, 1].map(|axis| from[axis] + sides[axis] / 2), pixels: sides[0] * sides[1] }
     }
 
-    /// The boxes in rows from the top.
+    /// The mean light of the box with this index.
+    pub(crate) fn light_at(&self, index: usize) -> [f32; 3] {
+        self.light[index]
+    }
+
+    /// The boxes in rows from the top, with their light.
     #[cfg(test)]
-    pub(crate) fn iter(&self) -> impl Iterator<Item = PlateBox> {
-        (0..self.len()).map(|index| self.at(index))
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (PlateBox, [f32; 3])> {
+        (0..self.len()).map(|index| (self.at(index), self.light_at(index)))
     }
 }
 
@@ -188,24 +188,19 @@ struct PlateRows<'a> {
 impl PlateRows<'_> {
     /// Exposed ACEScg over black of row `y`.
     fn light(&self, y: usize, light: &mut Vec<[f32; 4]>) {
-        let width = self.picture.color.width();
-        let row = &self.picture.color.pixels()[y * width..(y + 1) * width];
         // Straight alpha of linear light multiplies the light; elsewhere values are multiplied before they are converted, as in `plate::over_black`.
         let multiplies_light = self.alpha == PictureAlpha::Straight(color::AlphaConvention::Linear);
-        light.clear();
-        let values = row.iter().map(|pixel| if multiplies_light { *pixel } else { self.alpha.premultiplied(*pixel) });
+        light.resize(self.picture.color.width(), [0.0; 4]);
+        self.picture.color.row(y).copy_to(light);
+        if !multiplies_light {
+            light.iter_mut().for_each(|pixel| *pixel = self.alpha.premultiplied(*pixel));
+        }
         match self.picture.encoding {
-            Encoding::DisplaySrgb => {
-                light.extend(values);
-                self.view.encoded_to_scene_row(simd::level(), light);
-            }
+            Encoding::DisplaySrgb => self.view.encoded_to_scene_row(simd::level(), light),
             Encoding::LinearSrgb => {
-                light.extend(values.map(|[r, g, b, alpha]| {
-                    let [r, g, b] = color::acescg_from_srgb([r, g, b]);
-                    [r, g, b, alpha]
-                }));
+                light.iter_mut().for_each(|[r, g, b, _]| [*r, *g, *b] = color::acescg_from_srgb([*r, *g, *b]));
             }
-            Encoding::LinearAcescg => light.extend(values),
+            Encoding::LinearAcescg => {}
         }
         if multiplies_light {
             light.iter_mut().for_each(|[r, g, b, a]| [*r, *g, *b] = [*r * *a, *g * *a, *b * *a]);
@@ -275,6 +270,48 @@ fn limit([r, g, b]: [f32; 3], brightest: f32) -> ([f32; 3], bool) {
     ([r * factor, g * factor, b * factor], true)
 }
 
+/// Where a camera sees a pixel or a box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PixelView {
+    /// Sine of its elevation.
+    pub(crate) sine: f64,
+    /// Its solid angle, relative to that of the pixel at the principal point.
+    pub(crate) weight: f64,
+}
+
+/// What the views of boxes depend on: the camera, and the sizes of picture and plate, pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct BoxViewsKey {
+    pub(crate) camera: Camera,
+    pub(crate) picture: [usize; 2],
+    pub(crate) plate: [usize; 2],
+}
+
+/// Views of the boxes of a plate, `None` where the lens shows no direction. They stay while photographs of the same size follow each other.
+type BoxViews = Arc<Vec<Option<PixelView>>>;
+
+/// The last views of boxes.
+#[derive(Debug, Default)]
+pub(crate) struct BoxViewsCache(Mutex<Option<(BoxViewsKey, BoxViews)>>);
+
+impl BoxViewsCache {
+    /// The views of this key, computed by `compute` if they are not known.
+    pub(crate) fn get_or_compute(
+        &self,
+        key: BoxViewsKey,
+        compute: impl FnOnce() -> Vec<Option<PixelView>>,
+    ) -> BoxViews {
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, views)) = lock().as_ref().filter(|(known, _)| *known == key) {
+            return views.clone();
+        }
+        // Not while the lock is held: `compute` works in parallel.
+        let views = Arc::new(compute());
+        *lock() = Some((key, views.clone()));
+        views
+    }
+}
+
 /// The boxes of the plate of a scene, which are computed once for each plate and view.
 #[derive(Debug, Default)]
 pub(crate) struct PlateBoxesCache(Mutex<Option<(PlateBoxesKey, Arc<PlateBoxes>)>>);
@@ -335,8 +372,8 @@ mod tests {
 
     /// The mean over the plate, and the number of pixels that it is of.
     fn mean(boxes: &PlateBoxes) -> (f64, usize) {
-        let sum: f64 = boxes.iter().map(|each| f64::from(each.light[1]) * each.pixels as f64).sum();
-        let pixels: usize = boxes.iter().map(|each| each.pixels).sum();
+        let sum: f64 = boxes.iter().map(|(each, light)| f64::from(light[1]) * each.pixels as f64).sum();
+        let pixels: usize = boxes.iter().map(|(each, _)| each.pixels).sum();
         (sum / pixels as f64, pixels)
     }
 
@@ -394,8 +431,8 @@ mod tests {
     fn a_small_plate_is_taken_pixel_by_pixel_and_a_known_one_is_not_read_again() {
         let small = picture([7, 5], Encoding::LinearAcescg, |x, y| (x * 10 + y) as f32 / 100.0);
         let found = boxes(&small);
-        for each in found.iter() {
-            assert_eq!((each.light[0], each.pixels), ((each.center[0] * 10 + each.center[1]) as f32 / 100.0, 1));
+        for (each, light) in found.iter() {
+            assert_eq!((light[0], each.pixels), ((each.center[0] * 10 + each.center[1]) as f32 / 100.0, 1));
         }
         let key = PlateBoxesKey { digest: [1; 32], alpha: PictureAlpha::Opaque, view: color::View::DISPLAY };
         let cache = PlateBoxesCache::default();

@@ -239,7 +239,7 @@ pub(crate) fn golden(scene: &str, size: [usize; 2], frame: i64) -> Option<String
     }
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let known = decode_picture(&bytes, "png", &PictureLayers::default(), MemoryLimit::default()).unwrap();
-    let known: Vec<[f32; 3]> = known.color.pixels().iter().map(|pixel| over_black(*pixel)).collect();
+    let known: Vec<[f32; 3]> = known.color.iter().map(over_black).collect();
     let drawn = encoded(image);
     let (mean, worst) = blurred_difference(&known, &drawn, size);
     if known.len() == drawn.len() && mean < 0.5 && worst < 10.0 {

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use super::memory;
+use super::{memory, picture_pixels::PicturePixels};
 use crate::{
     color::AlphaConvention,
     geometry::{
@@ -51,7 +51,7 @@ impl PictureAlpha {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Red, green, blue in `encoding`, and alpha (1 where the file has none).
-    pub color: Image<4>,
+    pub color: PicturePixels,
     /// How alpha relates to the colors.
     pub alpha: PictureAlpha,
     /// The file's depth channel (`Z`), if it has one; row after row.
@@ -66,9 +66,9 @@ pub struct Picture {
 
 impl Picture {
     /// An opaque picture without depth.
-    pub fn opaque(color: Image<4>, encoding: Encoding) -> Self {
+    pub fn opaque(color: impl Into<PicturePixels>, encoding: Encoding) -> Self {
         let (alpha, depth) = (PictureAlpha::Opaque, None);
-        Self { color, alpha, depth, encoding, exposure_ev100: None, remarks: Vec::new() }
+        Self { color: color.into(), alpha, depth, encoding, exposure_ev100: None, remarks: Vec::new() }
     }
 }
 
@@ -365,7 +365,7 @@ pub trait Assets: Send + Sync {
     /// The asset is missing, damaged, too large or has no normals.
     fn normals(&self, path: &str, frame: i64) -> Result<Arc<NormalMap>, AssetError> {
         let picture = self.picture(path, frame)?;
-        let pixels = picture.color.pixels().iter().map(|&[x, y, z, _]| [x, y, z]).collect();
+        let pixels = picture.color.iter().map(|[x, y, z, _]| [x, y, z]).collect();
         let values = Image::from_pixels(picture.color.width(), picture.color.height(), pixels);
         let missing = || AssetError { path: path.to_owned(), problem: AssetProblem::NoChannel("X".into()) };
         Ok(Arc::new(NormalMap { values: values.ok_or_else(missing)?, remarks: picture.remarks.clone() }))

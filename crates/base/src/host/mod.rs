@@ -6,6 +6,7 @@ pub mod memory;
 pub mod observer;
 pub mod once;
 pub mod parallel;
+pub mod picture_pixels;
 pub mod plural;
 pub mod printable;
 pub mod scratch_pool;

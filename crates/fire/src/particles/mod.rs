@@ -46,7 +46,8 @@
 //! (4) and (5) are a property of kernels that integrate to 1.
 //!
 //! # Data flow
-//! 1. `parameters` holds the scene's values; `simulate::derived` derives the constants that the paper does not state; `error` are their errors.
+//! 1. `parameters` holds the scene's values; `simulate::derived` derives the constants that the paper does not state; `error` has the errors of
+//!    combinations of values.
 //! 2. A step (`simulate::Simulation::step`) runs sub-steps. In each, `simulate::fluid` sorts particles and computes density and pressure
 //!    force, `simulate::integrate` advances them (with `simulate::collision`), and `simulate::spawning` adds new ones.
 //! 3. Once per step `simulate::combustion` smooths velocity and temperature, burns fuel, forms soot and cools;

@@ -1,13 +1,13 @@
-//! Volume flame: burning gas on a grid, in thin sheets of soot that neck, roll and puff, and are seen from any side.
+//! Volume flame: burning gas on a grid, with thin layers of soot that neck, roll up and puff, and are seen from any side.
 //!
 //! # Model
-//! Air and gas from the burners flow by [`bansho_fluid`]. What a cell holds is the mixture fraction Z, the share of its mass that came from a burner, and the
-//! heat that it has lost. Fuel and air burn infinitely fast where they meet, so that temperature and density follow from the two; the sheet at the
-//! stoichiometric Zs is hottest. Soot lines its rich side, radiates, and cools the gas; what is left of it in lean gas is smoke. Nothing states a height, a
-//! frequency or a shape: they are what the flow does. SI units throughout; temperatures in K, luminance in cd/m^2.
+//! [`bansho_fluid`] moves air and the gas from the burners. A cell holds the mixture fraction Z, which is the share of its mass that came from a burner, and
+//! the heat that it has lost. Fuel and air burn infinitely fast where they meet, so that temperature and density follow from these two. The reaction zone, at the
+//! stoichiometric Zs, is hottest. Soot on its rich side radiates and cools the gas; the soot that is left in lean gas is smoke. No parameter states a height, a
+//! frequency or a shape: they follow from the flow. SI units throughout; temperatures in K, luminance in cd/m^2.
 //!
 //! # References
-//! - S. Burke and T. Schumann, "Diffusion flames" (1928): a sheet between fuel and air.
+//! - S. Burke and T. Schumann, "Diffusion flames" (1928): an infinitely thin reaction zone between fuel and air.
 //! - D. Nguyen, R. Fedkiw and H. Jensen, "Physically based modeling and animation of fire" (2002); J. Hong, T. Shinar and R. Fedkiw, "Wrinkled flames and cellular
 //!   patterns" (2007); C. Horvath and W. Geiger, "Directable, high-resolution simulation of fire on the GPU" (2009); R. Fedkiw, J. Stam and H. Jensen, "Visual
 //!   simulation of smoke" (2001): fire and smoke on grids in computer graphics.
@@ -34,8 +34,8 @@
 //! 2. `simulate::domain` determines the grid, `simulate::burners` the cells into which gas flows; `simulate` steps the gas; `simulate::snapshot` serializes it.
 //!    The beginning is computed on a grid of twice the spacing.
 //! 3. `run` steps and draws one shot; `phenomenon` is what all shots share, as the rest of Bansho sees it.
-//! 4. To draw a frame, `render::field` holds the gas of a state, and `render::blocks` where there is anything to see. `render::nodes` looks it up along rays at most
-//!    0.65 cells apart, `render::march` steps along all rays between these, sixteen at a time, with what gas emits and absorbs from `render::optics` and
+//! 4. To draw a frame, `render::field` holds the gas of a state, and `render::blocks` the blocks of cells in which gas is seen. `render::nodes` looks it up along
+//!    rays at most 0.65 cells apart, `render::march` steps along all rays between these, sixteen at a time, with what gas emits and absorbs from `render::optics` and
 //!    `render::sheet` and the light on smoke from `render::smoke`. `render::reference` is the naive way, one ray at a time, for tests and benchmarks.
 //! 5. `render::lights` gives point lights for other objects, `render::haze` the deflection of light from behind; `render::prepared` draws strips and AOVs.
 

@@ -19,7 +19,7 @@ pub(crate) trait MemoryBytes {
 
 impl MemoryBytes for Picture {
     fn memory_bytes(&self) -> usize {
-        size_of_val(self.color.pixels()) + self.depth.as_ref().map_or(0, |depth| size_of_val(&depth[..]))
+        self.color.memory_bytes() + self.depth.as_ref().map_or(0, |depth| size_of_val(&depth[..]))
     }
 }
 

@@ -1,5 +1,5 @@
-//! What the decoders of pictures share: a picture as it is stored, before it is turned and before its colors are converted; [`color`] converts them, and [`exif`]
-//! reads the orientation and the exposure.
+//! What the decoders of pictures share: a picture as it is stored, before it is rotated and before its colors are converted; [`color`] converts them, and
+//! [`exif`] reads the orientation and the exposure.
 
 pub(crate) mod color;
 pub(crate) mod exif;
@@ -53,7 +53,7 @@ impl DecodedPicture {
         let stored = Image::from_pixels(self.width, self.height, self.pixels);
         let stored = stored.ok_or_else(|| damaged("its pixels do not fill it"))?;
         remarks.extend(self.exif.remarks);
-        let color = self.exif.orientation.apply(stored);
+        let color = self.exif.orientation.apply(stored).into();
         Ok(Picture { color, alpha, depth: None, encoding, exposure_ev100: self.exif.ev100, remarks })
     }
 }

@@ -1,4 +1,4 @@
-//! JPEG plates: decoded by `zune-jpeg`, whose silence about corrupt data [`scans`] breaks.
+//! JPEG plates: decoded by `zune-jpeg`. It decodes some corrupt files without an error; [`scans`] finds what is wrong in them.
 
 mod huffman;
 mod scans;

@@ -1,8 +1,8 @@
 //! Strokes from SVG files: visible paths, polylines, polygons and lines, as `usvg` resolves `use`, nested `svg`, `switch`, units and transforms.
 //!
-//! `text` unpacks the file, and `markup` bounds what its parser would repeat. `document` notes what `usvg` would drop or cut in silence: faulty data, what is
-//! no line, the view box, and how many points all uses have. `style` matches style sheets, `moved` brings what is far from 0 near it, and `plain` writes
-//! what is left for `usvg`. `strokes` turns the resolved tree into polylines.
+//! `text` unpacks the file, and `markup` limits what the parser of XML would repeat. `document` finds what `usvg` would drop or cut without an error: faulty
+//! data and elements that are not lines. It also reads the view box and counts the points of all uses. `style` matches style sheets, `moved` moves drawings
+//! that are far from 0 near it, and `plain` writes the markup that `usvg` resolves. `strokes` turns the resolved tree into polylines.
 
 mod document;
 mod markup;

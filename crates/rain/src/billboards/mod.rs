@@ -6,8 +6,8 @@
 //!
 //! Far billboards are stochastically simplified: a random subset of the drops is drawn, each with a higher opacity, such that all together block the same
 //! area. In R. L. Cook, J. Halstead, M. Planck and D. Ryu, "Stochastic simplification of aggregate detail" (2007), the number of elements follows from the
-//! size of an object in the picture; here from what a single drop contributes to a pixel, so that large and bright drops, which one sees one by one, are all
-//! drawn, and no streak that stands for several drops is seen as one.
+//! size of an object in the picture; here from what a single drop contributes to a pixel, so that large and bright drops, which are visible one by one, are
+//! all drawn, and no single streak that represents several drops is visible.
 
 pub mod texture;
 

@@ -6,7 +6,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use bansho_base::math::{self, DVec3};
+use bansho_base::{
+    math::{self, DVec3},
+    world::sky::Sky,
+};
 
 /// Refractive index of water at 20 degrees Celsius and 630, 540 and 460 nm, about the wavelengths of ACEScg's red,
 /// green and blue.
@@ -62,6 +65,28 @@ impl DropPhaseFunction {
             [0, 1, 2].map(|c| sum[c] + incident[c])
         });
         sum.map(|sum| sum * (1.0 / DIRECTIONS as f32))
+    }
+
+    /// [`mean_radiance`](Self::mean_radiance) under a sky, with the same bits. Where the sky was measured, all directions are looked up at once.
+    #[inline(always)]
+    pub(super) fn mean_sky_radiance(&self, line: DVec3, sky: &Sky) -> [f32; 3] {
+        let (side, up) = line.any_orthonormal_pair();
+        let mut sines = [0.0; DIRECTIONS];
+        for i in 0..DIRECTIONS {
+            let direction = &self.directions[i];
+            sines[i] = side.y * direction.x + up.y * direction.y + line.y * direction.z;
+        }
+        let Some(planes) = sky.measured_radiances(&sines) else {
+            return self.mean_radiance(line, |direction| sky.radiance(direction));
+        };
+        let mut mean = [0.0; 3];
+        for c in 0..3 {
+            for i in 0..DIRECTIONS {
+                mean[c] += planes[c][i];
+            }
+            mean[c] *= 1.0 / DIRECTIONS as f32;
+        }
+        mean
     }
 }
 
@@ -169,6 +194,12 @@ fn stratified_directions(phase: &[f64; ANGLE_STEPS + 1]) -> [DVec3; DIRECTIONS] 
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::{
+        math::simd,
+        world::sky::{ElevationProfile, ElevationSample, SkyKind},
+    };
+    use fearless_simd::dispatch;
+
     use super::*;
     use crate::tests::reference::{near, rows};
 
@@ -248,6 +279,24 @@ mod tests {
         for line in [DVec3::Z, DVec3::X, DVec3::new(0.3, -0.5, 0.2).normalize()] {
             let seen = phase_function.mean_radiance(line, |_| [3.0, 2.0, 1.0]);
             assert!(seen.iter().zip([3.0, 2.0, 1.0]).all(|(seen, sky)| near(*seen as f64, sky, 1e-6)));
+        }
+    }
+
+    #[test]
+    fn a_measured_sky_has_the_bits_of_its_directions() {
+        let samples = (0..60).map(|i| ElevationSample {
+            sine: f64::from(i) / 30.0 - 1.0,
+            weight: 1.0,
+            radiance: [i as f32, 7.0, 0.3 * i as f32],
+        });
+        let phase_function = DropPhaseFunction::new();
+        let measured = Sky::measured(ElevationProfile::from_samples(samples).unwrap());
+        for sky in [measured, Sky::new(SkyKind::Overcast, 900.0, 6500.0)] {
+            for line in [DVec3::Z, -DVec3::Y, DVec3::new(0.3, 0.5, -0.2).normalize()] {
+                let expected = phase_function.mean_radiance(line, |direction| sky.radiance(direction));
+                let found = dispatch!(simd::level(), _simd => phase_function.mean_sky_radiance(line, &sky));
+                assert_eq!(found.map(f32::to_bits), expected.map(f32::to_bits), "{line}");
+            }
         }
     }
 

@@ -20,8 +20,22 @@ pub(super) struct OpticalDepthTable {
     distances: Vec<f32>,
     /// For each interval between them: its start (m), the inverse of its width, the optical depth at its start, and its increase.
     intervals: Vec<[f32; 4]>,
+    /// For each bucket of distances how many stored distances are not above its least one.
+    stored_up_to: Vec<u32>,
     /// Number of intervals that lamps light.
     lit_intervals: usize,
+}
+
+/// Buckets of distances: eight in an octave, by exponent and leading bits, from 2^-10 to 2^20 m. The first and the last also hold what is beyond them.
+const BUCKET_SHIFT: u32 = 20;
+const FIRST_BUCKET: u32 = (127 - 10) << 3;
+const BUCKETS: u32 = 30 << 3;
+
+/// The bucket of a distance; the first for NaN and below 0.
+#[inline(always)]
+fn bucket(distance: f32) -> usize {
+    let distance = if distance > 0.0 { distance } else { 0.0 };
+    (distance.to_bits() >> BUCKET_SHIFT).saturating_sub(FIRST_BUCKET).min(BUCKETS - 1) as usize
 }
 
 impl OpticalDepthTable {
@@ -32,7 +46,12 @@ impl OpticalDepthTable {
             let width = (ends[1] - ends[0]).max(f64::MIN_POSITIVE);
             intervals.push([ends[0] as f32, (1.0 / width) as f32, depths[0], depths[1] - depths[0]]);
         }
-        Self { distances: distances.iter().map(|distance| *distance as f32).collect(), intervals, lit_intervals }
+        let distances: Vec<f32> = distances.iter().map(|distance| *distance as f32).collect();
+        let stored_up_to = (0..BUCKETS).map(|bucket| {
+            let least = if bucket == 0 { 0.0 } else { f32::from_bits((bucket + FIRST_BUCKET) << BUCKET_SHIFT) };
+            distances.partition_point(|stored| *stored <= least) as u32
+        });
+        Self { stored_up_to: stored_up_to.collect(), distances, intervals, lit_intervals }
     }
 
     /// Distances at which the light of lamps is stored.
@@ -43,7 +62,11 @@ impl OpticalDepthTable {
     /// Index of the interval that contains a distance (m); that of the last one beyond it.
     #[inline(always)]
     pub(super) fn interval(&self, distance: f32) -> usize {
-        let next = self.distances.partition_point(|stored| *stored <= distance);
+        // From what is stored up to its bucket one or two steps lead to it, fewer than a search takes.
+        let mut next = self.stored_up_to[bucket(distance)] as usize;
+        while self.distances.get(next).is_some_and(|stored| *stored <= distance) {
+            next += 1;
+        }
         next.clamp(1, self.intervals.len()) - 1
     }
 
@@ -271,9 +294,26 @@ impl RaySegments {
 
 #[cfg(test)]
 mod tests {
-    use bansho_base::math::{random::Key, random::Purpose};
+    use bansho_base::math::{self, random::Key, random::Purpose};
 
     use super::*;
+
+    #[test]
+    fn every_distance_is_found_in_its_interval() {
+        let mut distances = vec![0.0, 1e-5, 0.4, 0.5];
+        while distances[distances.len() - 1] < 3e6 {
+            distances.push(1.25 * distances[distances.len() - 1]);
+        }
+        let depths: Vec<f32> = (0..distances.len()).map(|index| index as f32).collect();
+        let table = OpticalDepthTable::new(&distances, &depths, 5);
+        let stored: Vec<f32> = distances.iter().map(|distance| *distance as f32).collect();
+        let between = (0..4000).map(|step| 1e-6 * math::exp(f64::from(step) * 0.008) as f32);
+        let beside = stored.iter().flat_map(|stored| [stored.next_down().max(0.0), *stored, stored.next_up()]);
+        for distance in between.chain(beside).chain([0.0, -0.0, -1.0, f32::NAN, f32::INFINITY, f32::MAX]) {
+            let next = stored.partition_point(|stored| *stored <= distance);
+            assert_eq!(table.interval(distance), next.clamp(1, stored.len() - 1) - 1, "{distance}");
+        }
+    }
 
     #[test]
     fn sixteen_distances_are_located_as_each_one_alone() {

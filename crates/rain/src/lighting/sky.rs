@@ -2,7 +2,13 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use bansho_base::{camera::Camera, math::DVec3, phenomenon::strip::View, world::sky::Sky};
+use bansho_base::{
+    camera::Camera,
+    math::{DVec3, simd},
+    phenomenon::strip::View,
+    world::sky::Sky,
+};
+use fearless_simd::dispatch;
 
 use super::{
     drop_phase_function::DropPhaseFunction,
@@ -83,7 +89,8 @@ fn sky_through_drops(phase_function: &DropPhaseFunction, tiles: &TileGrid, sky: 
     if sky.is_dark() {
         return vec![[0.0; 3]; tiles.directions.len()];
     }
-    tiles.map(|_, line| phase_function.mean_radiance(line, |direction| sky.radiance(direction)))
+    let level = simd::level();
+    tiles.map(|_, line| dispatch!(level, _simd => phase_function.mean_sky_radiance(line, sky)))
 }
 
 /// Radiance of infinitely deep rain at each corner: the sky, below the horizon that at the horizon (Koschmieder 1924).

@@ -1,4 +1,4 @@
-//! Streaks: drops as an exposure shows them. Projection into the picture, binning into tiles, rasterization.
+//! Streaks: the paths of drops during the exposure. Projection into the picture, binning into tiles, rasterization.
 
 pub(crate) mod bin;
 pub mod coverage;

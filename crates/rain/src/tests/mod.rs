@@ -1,4 +1,4 @@
-//! Rain as a whole: what its pictures measure.
+//! Rain as a whole: measurements of its pictures.
 
 mod agreement;
 mod drops;

@@ -5,8 +5,8 @@
 //! Billboards fall with v(D); one that has fallen into the ground returns to the top. Each turns about the vertical toward the camera, is lit at its corners
 //! by directional, point and spot lights, and shows the texture of the rate nearest to R. All are drawn in order of depth.
 //!
-//! Where the paper is silent: light is `E / (4 pi)`, that of a drop which scatters evenly; textures are filtered with mipmaps, bilinearly, as OpenGL does; a
-//! billboard whose brightest pixel would be less than 1/128 of an 8-bit code counts as unlit.
+//! What the paper does not state: light is `E / (4 pi)`, that of a drop which scatters isotropically; textures are filtered with mipmaps, bilinearly, as OpenGL
+//! does; a billboard whose brightest pixel would be less than 1/128 of an 8-bit code counts as unlit.
 //!
 //! What the paper leaves out is left out here: wind, sky light, airlight, lenses that defocus, and streaks that slant as the camera moves.
 

@@ -8,6 +8,7 @@ use bansho_base::{
     host::{
         assets::{Encoding, Picture, PictureAlpha},
         parallel::prelude::*,
+        picture_pixels::PixelRow,
     },
     image::Image,
     math::simd,
@@ -123,7 +124,11 @@ fn decode_with_boxes(
 
 /// Row `y` of a plate.
 fn decode_row(view: &color::View, picture: &Picture, alpha: PictureAlpha, y: usize, row: &mut [[f32; 4]]) {
-    row.copy_from_slice(picture.color.row(y));
+    let stored = picture.color.row(y);
+    if let (PixelRow::Codes(codes), PictureAlpha::Opaque, Encoding::DisplaySrgb) = (stored, alpha, picture.encoding) {
+        return view.codes_to_scene_row(simd::level(), codes, row);
+    }
+    stored.copy_to(row);
     if let PictureAlpha::Straight(_) = alpha {
         row.iter_mut().for_each(|pixel| *pixel = alpha.premultiplied(*pixel));
     }
@@ -255,6 +260,8 @@ fn to_scene(view: &color::View, encoding: Encoding, color: [f32; 3]) -> [f32; 3]
 
 #[cfg(test)]
 mod tests {
+    use bansho_base::host::picture_pixels::CodeImage;
+
     use super::*;
 
     #[test]
@@ -316,6 +323,31 @@ mod tests {
     }
 
     #[test]
+    fn codes_have_the_bits_of_the_floats_that_they_stand_for() {
+        let (width, height) = (67, 8);
+        let codes: Vec<[u8; 4]> =
+            (0..width * height).map(|index| [0, 1, 2, 3].map(|c| ((index * 7 + c * 89) % 256) as u8)).collect();
+        let floats = codes.iter().map(|pixel| pixel.map(|code| f32::from(code) / 255.0)).collect();
+        let floats = Picture::opaque(Image::from_pixels(width, height, floats).unwrap(), Encoding::DisplaySrgb);
+        let codes = Picture::opaque(CodeImage::from_pixels(width, height, codes).unwrap(), Encoding::DisplaySrgb);
+        for view in [color::View::DISPLAY, color::View::NEUTRAL, color::View::AGX, color::View::RAW] {
+            for view in [view, view.with_white_balance(Some(4000.0))] {
+                for alpha in [PictureAlpha::Opaque, PictureAlpha::Straight(AlphaConvention::Encoded)] {
+                    let [of_floats, of_codes] = [&floats, &codes].map(|picture| {
+                        assert_eq!(
+                            PlateBoxes::new(picture, alpha, &view),
+                            PlateBoxes::new(&floats, alpha, &view),
+                            "{alpha:?}"
+                        );
+                        decode(&view, picture, alpha, Image::filled(width, height, [0.0; 4]))
+                    });
+                    assert_eq!(of_codes, of_floats, "{alpha:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn boxes_of_a_plate_that_is_decoded_for_the_picture_are_those_of_the_plate_alone() {
         // Boxes of 2 x 2 pixels, but for the last column and row.
         let (width, height) = (401, 37);
@@ -351,9 +383,9 @@ mod tests {
                 let picture = Picture::opaque(Image::filled(3, 2, pixel), encoding);
                 let boxes = PlateBoxes::new(&picture, alpha, &view);
                 let drawn = over_black(&view, encoding, alpha, alpha.premultiplied(pixel));
-                for each in boxes.iter() {
-                    let near = each.light.iter().zip(drawn).all(|(own, drawn)| (own - drawn).abs() < 1e-4);
-                    assert!(near, "{encoding:?} {alpha:?}: {:?} is drawn {drawn:?}", each.light);
+                for (_, light) in boxes.iter() {
+                    let near = light.iter().zip(drawn).all(|(own, drawn)| (own - drawn).abs() < 1e-4);
+                    assert!(near, "{encoding:?} {alpha:?}: {:?} is drawn {drawn:?}", light);
                 }
             }
         }

@@ -9,7 +9,11 @@ use bansho_base::{
 };
 
 use super::plate_mapping::PlateMapping;
-use crate::{compiled::CompiledScene, plan::Plan, plate_boxes::BRIGHTEST_LUMINANCE};
+use crate::{
+    compiled::CompiledScene,
+    plan::Plan,
+    plate_boxes::{BRIGHTEST_LUMINANCE, BoxViewsKey, PixelView},
+};
 
 /// The light from all elevations, as the plate of the first frame shows it through the camera at time 0; 1.0 is display white. `None`
 /// where there is no plate, or none that can be read.
@@ -19,14 +23,22 @@ pub(crate) fn plate_light(compiled: &CompiledScene, plan: &Plan) -> Option<Eleva
     let boxes = compiled.plate_boxes(plan.view_transform())?;
     let camera = plan.camera.at(0.0, plan.size);
     let mapping = PlateMapping::new(plan, boxes.size());
-    let of_boxes = (0..boxes.len()).into_par_iter().map(|index| {
+    let view_of = |index: usize| {
         let each = boxes.at(index);
         let [x, y] = [0, 1].map(|axis| mapping.picture_position(axis, each.center[axis]));
-        let sample = sample(&camera, DVec2::new(x, y), each.light)?;
-        Some(ElevationSample { weight: sample.weight * each.pixels as f64 / boxes.pixels_in_box(), ..sample })
-    });
-    let of_boxes: Vec<Option<ElevationSample>> = of_boxes.collect();
-    let samples: Vec<ElevationSample> = of_boxes.into_iter().flatten().collect();
+        let view = pixel_view(&camera, DVec2::new(x, y))?;
+        Some(PixelView { weight: view.weight * each.pixels as f64 / boxes.pixels_in_box(), ..view })
+    };
+    let key = BoxViewsKey { camera, picture: plan.size, plate: boxes.size() };
+    let views = compiled.box_views(key, || (0..boxes.len()).into_par_iter().map(view_of).collect());
+    let mut samples = Vec::with_capacity(views.len());
+    for (index, view) in views.iter().enumerate() {
+        samples.extend(view.map(|view| ElevationSample {
+            sine: view.sine,
+            weight: view.weight,
+            radiance: boxes.light_at(index),
+        }));
+    }
     let above = open_sky(&samples);
     ElevationProfile::from_samples(samples.into_iter().chain(above))
 }
@@ -91,12 +103,12 @@ fn overcast_gradation(elevation_sine: f64) -> f64 {
     1.0 + 2.0 * elevation_sine.max(0.0)
 }
 
-/// The light of a pixel, with the sine of its elevation and its solid angle as the weight.
-fn sample(camera: &Camera, pixel: DVec2, radiance: [f32; 3]) -> Option<ElevationSample> {
+/// Where a pixel is seen: the sine of its elevation, and its solid angle as the weight.
+fn pixel_view(camera: &Camera, pixel: DVec2) -> Option<PixelView> {
     let direction = camera.direction(pixel)?;
     // Relative to the pixel at the principal point, since the samples of the open sky are weighted in this unit.
     let weight = camera.pixel_solid_angle(pixel) * camera.focal_pixels * camera.focal_pixels;
-    Some(ElevationSample { sine: direction.y / direction.length(), weight, radiance })
+    Some(PixelView { sine: direction.y / direction.length(), weight })
 }
 
 #[cfg(test)]
@@ -153,7 +165,7 @@ mod tests {
         use bansho_base::camera::{CameraParameters, Lens};
         for lens in [Lens::Perspective, Lens::Fisheye, Lens::Panorama] {
             let camera = CameraParameters { lens, ..CameraParameters::default() }.at(0.0, [128, 128]);
-            let weight = |pixel| sample(&camera, pixel, [1.0; 3]).unwrap().weight;
+            let weight = |pixel| pixel_view(&camera, pixel).unwrap().weight;
             let ray = |x: f64, y: f64| camera.direction(DVec2::new(x, y)).unwrap().normalize();
             for [x, y] in [[64.0, 64.0], [64.0, 3.0], [32.5, 110.0]] {
                 let parallelogram = (ray(x + 0.5, y) - ray(x - 0.5, y)).cross(ray(x, y + 0.5) - ray(x, y - 0.5));

@@ -2,7 +2,11 @@
 
 use std::fmt;
 
-use bansho_base::host::parallel::prelude::*;
+use bansho_base::{
+    host::parallel::prelude::*,
+    math::simd::{self, LANES},
+};
+use fearless_simd::dispatch;
 
 use super::picture::DepthKind;
 
@@ -76,15 +80,7 @@ impl DepthValues {
 
     fn of_chunk(values: &[f32]) -> Self {
         let mut counts = LaneCounts::NONE;
-        let (batches, rest) = values.as_chunks::<LANES>();
-        for batch in batches {
-            for lane in 0..LANES {
-                counts.add(lane, batch[lane]);
-            }
-        }
-        for (lane, value) in rest.iter().enumerate() {
-            counts.add(lane, *value);
-        }
+        dispatch!(simd::level(), _simd => counts.add_all(values));
         let LaneCounts { positive, negative, zero, infinite, low, high } = counts;
         let [positive, negative, zero, infinite] =
             [positive, negative, zero, infinite].map(|lanes| lanes.iter().sum::<u32>() as usize);
@@ -119,9 +115,6 @@ impl DepthValues {
     }
 }
 
-/// Lanes in which values are counted: the six numbers of each fit in the narrowest vector registers.
-const LANES: usize = 4;
-
 /// Counts in lanes, which the compiler keeps in vectors.
 struct LaneCounts {
     positive: [u32; LANES],
@@ -142,6 +135,19 @@ impl LaneCounts {
         low: [f32::INFINITY; LANES],
         high: [f32::NEG_INFINITY; LANES],
     };
+
+    #[inline(always)]
+    fn add_all(&mut self, values: &[f32]) {
+        let (batches, rest) = values.as_chunks::<LANES>();
+        for batch in batches {
+            for lane in 0..LANES {
+                self.add(lane, batch[lane]);
+            }
+        }
+        for (lane, value) in rest.iter().enumerate() {
+            self.add(lane, *value);
+        }
+    }
 
     /// Counts a value, without branches.
     #[inline(always)]

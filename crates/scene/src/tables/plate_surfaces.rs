@@ -76,7 +76,7 @@ impl PlateParameters {
         };
         let albedo = assets.picture(&path.0, frame).map_err(|error| build_error("albedo", error))?;
         check_shape("albedo", &path.0, size(&albedo), image)?;
-        check_range("albedo", &path.0, albedo.color.pixels(), size(&albedo)[0], [0.0, 1.0])?;
+        check_range("albedo", &path.0, albedo.color.iter(), size(&albedo)[0], [0.0, 1.0])?;
         remarks.extend(file_remarks("albedo", &albedo.remarks));
         remark_size("albedo", size(&albedo), image, remarks);
         let normals = match &self.normal {
@@ -84,7 +84,7 @@ impl PlateParameters {
                 let normals = assets.normals(&path.0, frame).map_err(|error| build_error("normal", error))?;
                 let normals_size = [normals.values.width(), normals.values.height()];
                 check_shape("normal", &path.0, normals_size, image)?;
-                check_range("normal", &path.0, normals.values.pixels(), normals_size[0], [-1.0, 1.0])?;
+                check_range("normal", &path.0, normals.values.pixels().iter().copied(), normals_size[0], [-1.0, 1.0])?;
                 remarks.extend(file_remarks("normal", &normals.remarks));
                 remark_size("normal", normals_size, image, remarks);
                 Some(normals)
@@ -99,14 +99,14 @@ impl PlateParameters {
 fn check_range<const N: usize>(
     key: &str,
     path: &str,
-    pixels: &[[f32; N]],
+    pixels: impl Iterator<Item = [f32; N]>,
     width: usize,
     [min, max]: [f32; 2],
 ) -> Result<(), BuildError> {
     let is_outside = |value: f32| value < min - TOLERANCE || value > max + TOLERANCE;
-    let found = pixels.iter().enumerate().find_map(|(index, pixel)| {
-        let value = pixel[..3].iter().find(|value| is_outside(**value))?;
-        Some((index, *value))
+    let found = pixels.enumerate().find_map(|(index, pixel)| {
+        let value = pixel.into_iter().take(3).find(|value| is_outside(*value))?;
+        Some((index, value))
     });
     let Some((index, value)) = found else { return Ok(()) };
     let (x, y) = (index % width, index / width);
@@ -143,8 +143,9 @@ mod tests {
     #[test]
     fn a_value_out_of_range_is_told_with_its_place() {
         let pixels = [[0.0, 0.5, 1.0], [f32::NAN, 0.5, 1.0005], [0.2, -0.1, 0.5]];
-        let told =
-            |pixels: &[[f32; 3]]| check_range("albedo", "a.exr", pixels, 2, [0.0, 1.0]).map_err(|e| e.kind.to_string());
+        let told = |pixels: &[[f32; 3]]| {
+            check_range("albedo", "a.exr", pixels.iter().copied(), 2, [0.0, 1.0]).map_err(|e| e.kind.to_string())
+        };
         assert_eq!(told(&pixels[..2]), Ok(()));
         let error = told(&pixels).unwrap_err();
         assert!(error.contains("a.exr: has the value -0.1 at pixel [0, 1]; allowed: 0 to 1"), "{error}");

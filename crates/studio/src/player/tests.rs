@@ -294,7 +294,7 @@ fn a_still_is_the_file_that_render_writes() {
         assert!(same(&events[1]), "{name}");
         let decoded = bansho::media::assets::FileAssets::new(folder.path());
         let plate = decoded.picture(&format!("out/scene/{name}"), 0).unwrap();
-        let codes = plate.color.pixels().iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
+        let codes = plate.color.iter().map(|pixel| pixel.map(|value| (value * 255.0).round() as u8));
         assert!(codes.eq(rendered_with_alpha(&text.replace("overscan = 6", ""), number, false)), "{name}");
     }
 }

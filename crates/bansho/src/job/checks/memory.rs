@@ -275,7 +275,7 @@ fn covered_part(compiled: &CompiledScene, plan: &Plan) -> f64 {
 /// Memory of the files of a plate, bytes, which does not depend on the size of the picture.
 fn plate_file_bytes(compiled: &CompiledScene) -> f64 {
     let bytes = plate_file_bytes_per_pixel(compiled);
-    compiled.plate_image().map_or(0.0, |picture| bytes * picture.color.pixels().len() as f64)
+    compiled.plate_image().map_or(0.0, |picture| bytes * picture.color.count() as f64)
 }
 
 fn plate_file_bytes_per_pixel(compiled: &CompiledScene) -> f64 {

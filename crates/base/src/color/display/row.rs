@@ -311,6 +311,28 @@ pub(super) fn encoded_to_scene<V: ChannelInverse>(view: &V, pixels: &mut [[f32; 
     }
 }
 
+/// sRGB codes to exposed ACEScg by the inverse of a transform, with 1 as the fourth component.
+#[inline(always)]
+pub(super) fn codes_to_scene<V: ChannelInverse>(view: &V, codes: &[[u8; 4]], scene: &mut [[f32; 4]]) {
+    let channels_of_codes = view.channels_of_codes();
+    let count = codes.len().min(scene.len());
+    for (codes, scene) in codes[..count].chunks(BLOCK).zip(scene[..count].chunks_mut(BLOCK)) {
+        let (mut channels, mut light) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3]);
+        for (i, pixel) in codes.iter().enumerate() {
+            for c in 0..3 {
+                channels[c][i] = channels_of_codes[usize::from(pixel[c])];
+            }
+        }
+        for i in 0..BLOCK {
+            let rgb = view.acescg_from_channels([channels[0][i], channels[1][i], channels[2][i]]);
+            (light[0][i], light[1][i], light[2][i]) = (rgb[0], rgb[1], rgb[2]);
+        }
+        for (i, pixel) in scene.iter_mut().enumerate() {
+            *pixel = [light[0][i], light[1][i], light[2][i], 1.0];
+        }
+    }
+}
+
 /// The channels of the codes that are nearest to values, and whether all values are those of codes.
 #[inline(always)]
 fn channels_of_block(channels_of_codes: &[f32; 256], values: &Planes) -> (Planes, bool) {

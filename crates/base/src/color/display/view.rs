@@ -10,6 +10,7 @@ use super::{
     quantize::DisplayCode,
     row::{self, Clamped, DisplayTransform},
     tone::ToneCurve,
+    transfer::VALUES_OF_CODES,
 };
 use crate::color::white_balance::WhiteBalance;
 
@@ -166,6 +167,21 @@ impl View {
         }
         dispatch!(level, _simd => row::encoded_to_scene(&CameraResponse, pixels));
         self.invert_balance(pixels);
+    }
+
+    /// [`to_scene`](Self::to_scene) for many opaque pixels of sRGB codes: exposed ACEScg and 1. The codes' alpha is not read. The shorter of both slices
+    /// determines how many are written.
+    pub fn codes_to_scene_row(&self, level: Level, codes: &[[u8; 4]], scene: &mut [[f32; 4]]) {
+        if self.transform == Transform::CameraResponse {
+            dispatch!(level, _simd => row::codes_to_scene(&CameraResponse, codes, scene));
+            self.invert_balance(scene);
+            return;
+        }
+        for (pixel, [r, g, b, _]) in scene.iter_mut().zip(codes) {
+            let [r, g, b] = [usize::from(*r), usize::from(*g), usize::from(*b)];
+            *pixel = [VALUES_OF_CODES[r], VALUES_OF_CODES[g], VALUES_OF_CODES[b], 1.0];
+        }
+        self.encoded_to_scene_row(level, scene);
     }
 
     /// Removes the white balance from many pixels.

@@ -72,6 +72,32 @@ impl ElevationProfile {
         interpolate(&self.bands, sine)
     }
 
+    /// [`radiance`](Self::radiance) for many sines, as one array per component, with the same bits. It vectorizes, which a cast to an integer does not.
+    #[inline(always)]
+    pub(super) fn radiances<const N: usize>(&self, sines: &[f64; N]) -> [[f32; N]; 3] {
+        /// Added to a number from 0 to 2^51 it rounds it, and its lowest bits are then the integer.
+        const ROUND: f64 = (1_u64 << 52) as f64;
+        let (mut lower, mut fractions) = ([0; N], [0.0; N]);
+        for i in 0..N {
+            let position = position(sines[i]);
+            let nearest = (position + ROUND) - ROUND;
+            let below = if nearest > position { nearest - 1.0 } else { nearest };
+            let below = if below > (BANDS - 2) as f64 { (BANDS - 2) as f64 } else { below };
+            // Within the table for NaN too.
+            lower[i] = ((below + ROUND).to_bits() as u32).min(BANDS as u32 - 2);
+            fractions[i] = position - below;
+        }
+        let mut planes = [[0.0; N]; 3];
+        for c in 0..3 {
+            for i in 0..N {
+                let lower = lower[i] as usize;
+                let [from, to] = [f64::from(self.bands[lower][c]), f64::from(self.bands[lower + 1][c])];
+                planes[c][i] = math::lerp(from, to, fractions[i]) as f32;
+            }
+        }
+        planes
+    }
+
     /// Illuminance of open, horizontal ground.
     pub(super) fn horizontal_illuminance(&self) -> [f32; 3] {
         self.horizontal
@@ -113,6 +139,19 @@ mod tests {
         assert_eq!(even.scaled(2.0).radiance(0.2), [6.0, 3.0, 0.0]);
         assert!(!even.is_dark() && even.scaled(0.0).is_dark());
         assert_eq!(ElevationProfile::from_samples([]), None);
+    }
+
+    #[test]
+    fn many_sines_have_the_bits_of_each_alone() {
+        let rising = (0..500).map(|i| sample(f64::from(i) / 250.0 - 1.0, (i * i) as f32));
+        let profile = ElevationProfile::from_samples(rising).unwrap();
+        let last = [1.0, -1.0, 0.0, 2.0, -3.0, 1.0 - 1.0 / BANDS as f64, f64::NAN];
+        let sines: [f64; 107] = std::array::from_fn(|i| *last.get(i).unwrap_or(&(i as f64 / 53.0 - 1.0)));
+        let planes = profile.radiances(&sines);
+        for (i, sine) in sines.into_iter().enumerate() {
+            let alone = profile.radiance(sine);
+            assert_eq!([0, 1, 2].map(|c| planes[c][i].to_bits()), alone.map(f32::to_bits), "{sine}");
+        }
     }
 
     #[test]

@@ -92,6 +92,12 @@ impl Sky {
         self.zenith.map(|value| value * relative_luminance as f32)
     }
 
+    /// [`radiance`](Self::radiance) for sines of elevation, as one array per component, with the same bits; `None` unless the sky was measured.
+    #[inline(always)]
+    pub fn measured_radiances<const N: usize>(&self, sines: &[f64; N]) -> Option<[[f32; N]; 3]> {
+        Some(self.measured.as_ref()?.radiances(sines))
+    }
+
     /// [`radiance`](Self::radiance) for sines of elevation, as one array per component; `None` for a night, whose radiance depends on the
     /// azimuth.
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! The state of the flame, and its time steps.
 //!
-//! `derived` are the constants, `burner` and `spawning` the sources of particles, `fluid` density and pressure, `forces` the external forces,
+//! `derived` has the constants, `burner` and `spawning` the sources of particles, `fluid` density and pressure, `forces` the external forces,
 //! `combustion` thermochemistry, `integrate` and `collision` motion, `snapshot` serialization. `particles` is the state. `particle_lanes` and `vectors` are
 //! SIMD utilities. `euler` is the paper's own algorithm, which a scene can select.
 

@@ -1,4 +1,4 @@
-//! Physics of the whole simulation.
+//! The whole simulation: its physics, determinism, exposures, and the gas of the paper.
 
 mod determinism;
 mod euler;

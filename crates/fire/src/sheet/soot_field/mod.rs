@@ -3,7 +3,7 @@
 //! The paper defines flame and smoke as distributions of soot temperature and density whose flow a fractal fluctuation disturbs, and gives no equations. Here
 //! the undisturbed distributions are those of a buoyant plume in closed form (`plume`). At each time the plume is sampled at coordinates that a scrolling
 //! fractal field displaces (`displacement`). Soot of optical depth tau and temperature T adds `B(T) (1 - exp(-tau))` (Kirchhoff's law) and light that it scatters,
-//! and absorbs what is behind it: hot soot is flame, cool soot is smoke, and nothing divides them.
+//! and absorbs what is behind it: hot soot is flame, cool soot is smoke, and there is no boundary between them.
 //!
 //! - W. R. Morton, G. Taylor and J. S. Turner, "Turbulent gravitational convection from maintained and instantaneous sources" (1956): linear spread.
 //! - B. J. McCaffrey, "Purely buoyant diffusion flames: some experimental results" (1979): temperature over height.

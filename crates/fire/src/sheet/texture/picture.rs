@@ -17,7 +17,7 @@ pub(crate) fn picture_texels(picture: &Picture) -> Vec<f32> {
         // NaN is not above 0.
         if level > 0.0 { level.min(1.0) } else { 0.0 }
     };
-    let levels: Vec<f32> = picture.color.pixels().iter().map(|pixel| gray_level(*pixel)).collect();
+    let levels: Vec<f32> = picture.color.iter().map(gray_level).collect();
     let columns = resampling_taps(width, COLUMNS);
     let mut narrow = vec![0.0; COLUMNS * height];
     for (row, resampled) in levels.chunks_exact(width).zip(narrow.chunks_exact_mut(COLUMNS)) {
@@ -90,7 +90,7 @@ mod tests {
             let picture = gray(size, |x, y| ((x * 5 + y * 3) % 11) as f32 / 11.0);
             let mean =
                 |values: &mut dyn Iterator<Item = f32>, count: usize| values.map(f64::from).sum::<f64>() / count as f64;
-            let before = mean(&mut picture.color.pixels().iter().map(|pixel| pixel[0]), size[0] * size[1]);
+            let before = mean(&mut picture.color.iter().map(|pixel| pixel[0]), size[0] * size[1]);
             let texels = picture_texels(&picture);
             let after = mean(&mut texels.iter().copied(), texels.len());
             assert!((before - after).abs() < 2e-3, "{size:?}: {before} {after}");
@@ -104,7 +104,7 @@ mod tests {
         let values = picture_texels(&picture);
         assert!(values.iter().all(|value| (0.0..=1.0).contains(value)) && values.contains(&0.5), "half of each");
         picture.alpha = PictureAlpha::Associated;
-        picture.color.pixels_mut().iter_mut().for_each(|pixel| *pixel = [0.0; 4]);
+        picture.color = Image::filled(picture.color.width(), picture.color.height(), [0.0; 4]).into();
         assert!(picture_texels(&picture).iter().all(|value| *value == 0.0));
     }
 }

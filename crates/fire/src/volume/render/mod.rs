@@ -1,4 +1,4 @@
-//! Drawing of the gas: rays through the grid.
+//! Rendering of the gas by marching rays through the grid.
 
 pub(crate) mod blocks;
 pub(crate) mod field;

@@ -51,7 +51,7 @@ pub(super) fn finish(
         depth
     });
     Ok(Picture {
-        color: Image::from_pixels(width, height, color).ok_or_else(|| damaged("its pixels do not fill it"))?,
+        color: Image::from_pixels(width, height, color).ok_or_else(|| damaged("its pixels do not fill it"))?.into(),
         alpha: if is_opaque { PictureAlpha::Opaque } else { PictureAlpha::Associated },
         depth,
         encoding: conversion.encoding,

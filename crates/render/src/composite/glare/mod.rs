@@ -1,7 +1,7 @@
 //! Glare: light that the lens, dust and air scatter, so that bright things are surrounded by a glow.
 //!
-//! A fraction of the light of each pixel is distributed over its surroundings, before the view transform. What the pixel loses its surroundings gain; their
-//! alpha, depth, layers and AOVs stay. Only light that Bansho draws is scattered: a plate was taken by a camera whose glare it already contains.
+//! A fraction of the light of each pixel is distributed over its surroundings, before the view transform. The surroundings gain what the pixel loses.
+//! Alpha, depth, layers and AOVs do not change. Only light that Bansho draws is scattered: a plate was taken by a camera whose glare it already contains.
 //!
 //! | | |
 //! | --- | --- |

@@ -1,4 +1,4 @@
-//! The drawing against closed forms: one ball of gas, pairs of them, and clouds.
+//! Rendered gas compared with closed forms: one ball of gas, pairs of them, and clouds.
 
 mod endings;
 mod exposures;

@@ -1,8 +1,9 @@
 //! Sheets that are small in the picture, whose structure is finer than its pixels: shaded in cells of the sheet, whose light is averaged over pixels.
 //!
 //! The threshold (5) and the color ramp are not linear. Light of a texture that was averaged first is not the average of the light: a flame of a few pixels
-//! would lose most of it. So the light is averaged. Cells are at fixed places of the sheet, and each is spread over the pixels in proportion
-//! to the area that it covers of them: the sum over the picture is that of a large picture through every lens, wherever the flame lies between pixels.
+//! would lose most of it. So the light is averaged. Cells are fixed to the sheet, and the light of each is spread over the pixels in
+//! proportion to the area that it covers in them. The sum over the picture is therefore that of a large picture, with every lens and at any position of the
+//! flame relative to the pixels.
 
 mod projected;
 
