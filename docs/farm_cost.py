@@ -95,7 +95,7 @@ def hours(seconds: float) -> str:
 
 def table(frames: int, scenes: int, task_s: float) -> None:
     """A row for each number of nodes."""
-    print("| nodes | snapshots | frames | last job | in all | faster | tasks x frames | starting | idle | file system |")
+    print("| nodes | job `snapshots` | job `frames` | job `finish` | total time | speedup | tasks x frames | startup | idle | file system |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     one = simulate(1, frames, scenes, task_s).wall
     for nodes in NODES:

@@ -1,9 +1,9 @@
 //! Gas of variable density at low Mach number on a staggered grid.
 //!
 //! # Model
-//! Velocities are on the faces of cubic cells, densities and what a kilogram of gas holds at their centers. Pressure is that above the air at rest. The bottom of
-//! the grid is a floor or open; its sides and its top are open to air in a uniform wind, so that a plume draws in as much air as it needs and leaves
-//! through the top. Solids are cells through whose faces nothing flows. SI units throughout.
+//! Velocities are on the faces of cubic cells; densities, and the quantities of a kilogram of gas, are at their centers. Pressures are relative to the air at
+//! rest. The bottom of the grid is a floor or open; its sides and its top are open to air in a uniform wind, so that a plume entrains air through the sides and
+//! leaves through the top. Solids are cells through whose faces nothing flows. SI units throughout.
 //!
 //! # Equations
 //! | equation | what it says | function |
@@ -18,13 +18,13 @@
 //!
 //! # Step
 //! 1. [`Flow::transport`] carries density and quantities, in two stages ([`Carrier::advance`]), with the values at faces of `reconstruction`.
-//! 2. The owner burns the gas and states [`Flow::divergence`].
+//! 2. The owner of the flow burns the gas and sets [`Flow::divergence`].
 //! 3. [`Flow::accelerate`] carries momentum (`momentum`), adds forces, and projects the velocity (`projection`: sine transforms along x and z, elimination
 //!    along y; with solids the capacitance matrix method).
 //!
-//! The pressure's equation has one density; the rest of its acceleration, `(1/rho - 1/rho_0) grad p`, is that of the pressure of the last step. Mass is conserved
-//! exactly, and the density that a mixture should have by its temperature is reached by the expansion: mixing of ideal gases changes no volume by itself, so
-//! that only burning and cooling expand and contract the gas, wherever numerical diffusion mixes it.
+//! The equation of the pressure has one density for all cells; the rest of the acceleration, `(1/rho - 1/rho_0) grad p`, is computed from the pressure of the
+//! last step. Mass is conserved exactly. A mixture reaches the density that belongs to its temperature by expansion. Mixing ideal gases does not change their
+//! volume, so only burning and cooling expand and contract the gas, even where numerical diffusion mixes it.
 //!
 //! # References
 //! - F. Harlow and J. Welch, "Numerical calculation of time-dependent viscous incompressible flow of fluid with free surface" (1965): the grid.

@@ -1,4 +1,4 @@
-//! The physics of auroral light: the atmosphere, where electrons spend their energy, and what the struck atoms emit.
+//! The physics of auroral light: the atmosphere, the altitudes at which electrons lose their energy, and the light of the atoms and molecules that they excite.
 
 pub mod atmosphere;
 pub mod calibration;

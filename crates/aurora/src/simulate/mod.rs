@@ -2,7 +2,7 @@
 //!
 //! [`AuroraSimulation`] advances them: the [`field`] attracts them to the in-between shape, `forces` has the repulsion
 //! and integration (`neighbor_cells` the neighbor search of the thesis), `relocation` creates and removes particles when the shape is updated, `energy_flux` assigns their
-//! power, [`afterglow`] keeps the delayed light.
+//! power, and [`afterglow`] stores the delayed light of the green and the red line.
 
 pub mod afterglow;
 mod energy_flux;

@@ -16,7 +16,7 @@
 //! picture: direction, angular radius, depth, radiance, and the illuminance at the camera. Disc and glare are functions of the angle between
 //! a pixel and the lamp, so that they are right for every lens, across the seam of a panorama and around the antipode of a fisheye. `PreparedLamps` draws the discs at
 //! their depths, antialiased, and the glare of all of them in the nearest depth interval. The illumination of
-//! other objects is that of the lights and not part of this module.
+//! other objects is computed from the lights, not in this module.
 
 mod parameters;
 mod phenomenon;

@@ -1,7 +1,7 @@
 //! Visible obstacles: boxes, spheres, cylinders and meshes, lit by lamps, fires, the sky and the ground around them.
 //!
-//! They are there to stand in rain and light: a car, a lamp post. There is direct light with shadows among themselves, one bounce from the ground,
-//! and the reflection of lamps and sky in a glossy surface; no interreflection.
+//! They are objects on which rain and light fall, such as a car or a lamp post. They receive direct light with shadows of each other and one bounce from the
+//! ground, and glossy surfaces reflect lamps and sky; there is no interreflection.
 //!
 //! # References
 //! - T. Moller and B. Trumbore, "Fast, minimum storage ray/triangle intersection" (1997).
@@ -22,9 +22,9 @@
 //! # Data flow
 //! [`Solids`] holds the obstacles, with a bounding volume hierarchy for each mesh. For a frame, `trace` places them at several times while the shutter is
 //! open (`pose`), and finds for each pixel what it shows: where the corners of a pixel show one smooth surface, one ray, else sixteen. `shade` computes
-//! the radiance. The drawn pixels are copied to the strips. Their depth hides all other phenomena, and where a pixel is covered partly, the renderer mixes in the
-//! scene without them ([`OpaqueSurfaces`](bansho_base::phenomenon::OpaqueSurfaces)). Where other things move over the same pixels, the renderer draws them at
-//! many moments of the exposure (`trace::UntracedSolids`).
+//! the radiance. The drawn pixels are copied to the strips. Their depth hides all phenomena behind them. Where a pixel is covered partly, the renderer mixes in
+//! the scene without them ([`OpaqueSurfaces`](bansho_base::phenomenon::OpaqueSurfaces)). Where other things move over the same pixels, the
+//! renderer draws them at many moments of the exposure (`trace::UntracedSolids`).
 
 mod intersect;
 mod obstacle;

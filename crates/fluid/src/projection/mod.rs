@@ -1,4 +1,4 @@
-//! The pressure that makes the divergence of the velocity what the expansion of the gas asks for.
+//! Projection of the velocity: the pressure that gives it the divergence that follows from the expansion of the gas.
 
 mod capacitance;
 mod poisson;

@@ -1,9 +1,9 @@
 //! Emission of excited atoms and molecules: photons, lifetime, diffusion and color.
 //!
-//! [`emitter`] lists the excited states, their lines and their colors, and `camera` has how a camera records these. [`excitation`] has the photons per
-//! ion pair, as measured and by the rules of the thesis; [`quenching`] which fraction of them is radiated, how late and how far away;
-//! `resonant_scattering` the sunlight that ions scatter. [`Emission`] is the table that follows: photons of each emitter by electron energy and altitude
-//! for a spectrum. [`extinction`](crate::physics::extinction) is the lower atmosphere. [`calibration`](super::calibration) compares all of it with
+//! [`emitter`] lists the excited states, their lines and their colors, and `camera` has the colors that a camera records. [`excitation`] has the photons per
+//! ion pair, as measured and by the rules of the thesis; [`quenching`] the fraction of them that is radiated, their delay and their diffusion until then;
+//! `resonant_scattering` the sunlight that ions scatter. [`Emission`] is the table that follows from these: photons of each emitter by electron energy and
+//! altitude for a spectrum. [`extinction`](crate::physics::extinction) is the lower atmosphere. [`calibration`](super::calibration) compares all of it with
 //! observations.
 
 pub(crate) mod camera;

@@ -1,5 +1,5 @@
-//! Binning: light sources, which are particles for prompt light and afterglow cells for green and red, by longitude and distance of their field lines on
-//! the chart ([`source_bins`]).
+//! Binning of light sources by the longitude and distance of their field lines on the chart ([`source_bins`]). Sources are particles for prompt light, and
+//! afterglow cells for the green and the red line.
 
 pub(crate) mod source_bins;
 

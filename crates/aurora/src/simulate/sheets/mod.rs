@@ -1,4 +1,4 @@
-//! Sheets as the simulation sees them: refined, folded, with a ray pattern along their length.
+//! The sheets of the simulation: the drawn ones, refined and folded, with a ray pattern along their length.
 
 pub(crate) mod arc_length;
 pub(crate) mod filaments;
