@@ -1,7 +1,7 @@
 //! One SPH step with about 35 neighbors per particle: cell list, density, pressure force, integration.
 //!
 //! Beside it are a version with all pairs (3,000 particles only: 100,000 would take a thousand times as long) and one with unsorted
-//! particles, a hash map of cells and scalar code; and a step of the particle flame with all features.
+//! particles, a hash map of cells and scalar code, whole and its lists of neighbors alone; and a step of the particle flame with all features.
 
 mod support;
 
@@ -16,7 +16,7 @@ use bansho_base::{
 
 use bansho_fire::particles::{FlameParticles, FlameParticlesParameters, FlameParticlesRun};
 use bansho_sph::{Cells, Kernel, KernelShape, Particles, PressureForce, StateEquation, compute_densities};
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use support::pinned_pool;
 
 const NEIGHBORS: f64 = 35.0;
@@ -128,18 +128,53 @@ fn all_pairs_step(particles: &mut Particles<3>) {
     });
 }
 
+/// Indices of the particles in each cell.
+type CellMap = HashMap<[i32; 3], Vec<usize>>;
+
+/// The cell of a particle, one support radius wide.
+fn cell_of(particles: &Particles<3>, i: usize) -> [i32; 3] {
+    particles.positions.each_ref().map(|x| (x[i] / SUPPORT).floor() as i32)
+}
+
+fn cell_map(particles: &Particles<3>) -> CellMap {
+    let mut map = CellMap::new();
+    (0..particles.len()).for_each(|i| map.entry(cell_of(particles, i)).or_default().push(i));
+    map
+}
+
+/// Visits the neighbors of particle `i` in the cells around its own.
+fn visit_neighbors(map: &CellMap, particles: &Particles<3>, i: usize, visitor: Visitor) {
+    let [x, y, z] = cell_of(particles, i);
+    for step in 0..27 {
+        let key = [x + step % 3 - 1, y + step / 3 % 3 - 1, z + step / 9 - 1];
+        map.get(&key).into_iter().flatten().for_each(|j| visit_if_near(particles, i, *j, visitor));
+    }
+}
+
 fn unsorted_step(particles: &mut Particles<3>) {
-    let cell =
-        |particles: &Particles<3>, i: usize| particles.positions.each_ref().map(|x| (x[i] / SUPPORT).floor() as i32);
-    let mut map: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
-    (0..particles.len()).for_each(|i| map.entry(cell(particles, i)).or_default().push(i));
-    scalar_step(particles, &|particles, i, visitor| {
-        let [x, y, z] = cell(particles, i);
-        for step in 0..27 {
-            let key = [x + step % 3 - 1, y + step / 3 % 3 - 1, z + step / 9 - 1];
-            map.get(&key).into_iter().flatten().for_each(|j| visit_if_near(particles, i, *j, visitor));
+    let map = cell_map(particles);
+    scalar_step(particles, &|particles, i, visitor| visit_neighbors(&map, particles, i, visitor));
+}
+
+/// The neighbors of each particle, for which [`Cells`] lists candidates.
+fn neighbor_lists(particles: &Particles<3>) -> Vec<Vec<usize>> {
+    let map = cell_map(particles);
+    let mut lists = vec![Vec::new(); particles.len()];
+    for (i, list) in lists.iter_mut().enumerate() {
+        visit_neighbors(&map, particles, i, &mut |j, _, _| list.push(j));
+    }
+    lists
+}
+
+/// Moves each particle by up to a twentieth of the support radius along each axis, farther than most do in a step.
+fn displace(particles: &mut Particles<3>) {
+    let key = Key::new(2, "displacement");
+    for i in 0..particles.len() {
+        let uniforms = key.uniforms(particles.ids[i], 0, Purpose(1));
+        for c in 0..3 {
+            particles.positions[c][i] += 0.05 * SUPPORT * (2.0 * uniforms[c] - 1.0);
         }
-    });
+    }
 }
 
 /// A flame of a step that is not divided, which has burned long enough to be whole.
@@ -195,6 +230,14 @@ fn benches(criterion: &mut Criterion) {
         let mut simulation = Simulation::<3>::new(100_000);
         pool.install(|| simulation.step());
         group.bench_function("cells", |bencher| pool.install(|| bencher.iter(|| simulation.sort())));
+        let mut moved = simulation.particles.clone();
+        displace(&mut moved);
+        let mut cells = Cells::new(SUPPORT);
+        group.bench_function("cells of moved particles", |bencher| {
+            pool.install(|| {
+                bencher.iter_batched_ref(|| moved.clone(), |moved| moved.sort(&mut cells), BatchSize::PerIteration);
+            });
+        });
         group.bench_function("density", |bencher| pool.install(|| bencher.iter(|| simulation.densities())));
         group.bench_function("pressure", |bencher| pool.install(|| bencher.iter(|| simulation.forces())));
         group.finish();
@@ -218,6 +261,8 @@ fn benches(criterion: &mut Criterion) {
             bencher.iter(|| unsorted_step(black_box(&mut particles)));
         });
     }
+    let particles = cloud::<3>(100_000);
+    group.bench_function("neighbor lists, 100000", |bencher| bencher.iter(|| neighbor_lists(black_box(&particles))));
     group.finish();
 }
 

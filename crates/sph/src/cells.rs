@@ -1,25 +1,20 @@
-//! Cell list: particles sorted by cell, storing occupied cells only.
+//! Cell list: particles sorted by cell.
 //!
-//! There is no dense grid. Occupied cells are a sorted list, so memory is proportional to the number of particles, however far they
-//! spread. A cell is one support radius wide, and a quarter of that along x. Cells are ordered along x, so the near cells of one
-//! row hold one contiguous range of particles: 3 ranges in 2-D, 9 in 3-D.
+//! A table holds where each cell begins, occupied or not, as long as there are not many more cells than particles. Where they are spread so far
+//! that there are, cells are found by search in the sorted keys: memory is proportional to the number of particles in any case. A cell is one support
+//! radius wide, and a quarter of that along x. Cells are ordered along x, so the near cells of one row hold one contiguous range of
+//! particles: 3 ranges in 2-D, 9 in 3-D.
 
 use bansho_base::host::parallel::{self, prelude::*};
-use fearless_simd::dispatch;
 
 use super::{
-    cell_rows::{CELLS_PER_RADIUS_X, CellRows, Keys, RowChunk, SEARCH_WIDTH},
+    cell_keys::{CellKeys, KeyLayout},
+    cell_rows::{self, CellRows, RowChunk},
     error::SphError,
     neighbor_groups::{BATCH, GroupBatch},
-    sorting::{Cell, MIN_PARTICLES_PER_TASK, SampleSort},
+    sorting::{INDEX_BITS, MIN_PARTICLES_PER_TASK, SampleSort, SortedParticles},
 };
 
-/// Cell coordinates are clamped to this distance from the origin, in support radii, so that a key of three axes fits 64 bits.
-const MAX_CELL_COORDINATE: i32 = 1 << 18;
-/// Cells are larger than the support radius by this factor, so that rounding never separates two neighbors by more than one cell.
-const CELL_SIZE_MARGIN: f32 = 1.001;
-/// Maximum length of a group, in cells along x: all particles within that length become candidates of the group.
-const MAX_GROUP_LENGTH: u64 = 8 * CELLS_PER_RADIUS_X as u64;
 /// Particles farther away than this, or at NaN, are moved to this coordinate. The square of such a distance is still finite.
 pub(super) const OUT_OF_RANGE: f32 = 1e12;
 
@@ -27,18 +22,14 @@ pub(super) const OUT_OF_RANGE: f32 = 1e12;
 #[derive(Clone, Debug)]
 pub struct Cells<const D: usize> {
     support_radius: f32,
-    keys: Keys<D>,
-    /// For each particle in sorted order, the index at which it was given.
-    order: Vec<u32>,
-    ids: Vec<u64>,
+    layout: KeyLayout<D>,
+    sorted: SortedParticles,
     /// Positions in sorted order, padded with one batch that is out of range.
     positions: [Vec<f32>; D],
-    /// Occupied cells; the last [`SEARCH_WIDTH`] are sentinels with the largest key.
-    occupied: Vec<Cell>,
+    /// Table of [`CellRows`].
+    starts: Vec<u32>,
     row_chunks: Vec<RowChunk>,
     batches: Vec<GroupBatch>,
-    /// Cell coordinate of each particle, one array per axis.
-    coordinates: [Vec<i32>; D],
     sorting: SampleSort,
     /// Scratch arrays that are swapped with those being reordered, one per thread.
     scratch: Vec<Vec<f32>>,
@@ -58,18 +49,14 @@ impl<const D: usize> Cells<D> {
     #[must_use]
     pub fn new(support_radius: f32) -> Self {
         const { assert!(D == 2 || D == 3, "particles have two or three dimensions") };
-        let keys = Keys::new([0; D], [0; D]);
-        let (order, ids, occupied, row_chunks, batches) = Default::default();
         Self {
             support_radius,
-            keys,
-            order,
-            ids,
+            layout: KeyLayout::new(&[[0; 2]; D]),
+            sorted: SortedParticles::default(),
             positions: [const { Vec::new() }; D],
-            occupied,
-            row_chunks,
-            batches,
-            coordinates: [const { Vec::new() }; D],
+            starts: Vec::new(),
+            row_chunks: Vec::new(),
+            batches: Vec::new(),
             sorting: SampleSort::default(),
             scratch: Vec::new(),
         }
@@ -89,13 +76,13 @@ impl<const D: usize> Cells<D> {
     /// Number of particles.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.order.len()
+        self.sorted.order.len()
     }
 
     /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.order.is_empty()
+        self.sorted.order.is_empty()
     }
 
     /// Sorts particles by cell, then by id, and finds the candidate neighbors of each group. [`Cells::reorder`] and
@@ -107,17 +94,21 @@ impl<const D: usize> Cells<D> {
     /// If there are more than 2^27 particles, or `positions` and `ids` differ in length.
     pub fn assign(&mut self, positions: [&[f32]; D], ids: &[u64]) {
         self.sort_by_cell(positions, ids);
-        let mut sorted = std::mem::replace(&mut self.positions, [const { Vec::new() }; D]);
-        sorted.par_iter_mut().zip(positions).for_each(|(to, from)| {
-            to.clear();
-            to.extend(self.order.iter().map(|index| limit_to_range(from[*index as usize])));
-            to.resize((ids.len() + BATCH).next_multiple_of(BATCH), -OUT_OF_RANGE);
+        let order = &self.sorted.order;
+        self.positions.par_iter_mut().zip(positions).for_each(|(to, from)| {
+            to.resize((ids.len() + BATCH).next_multiple_of(BATCH), 0.0);
+            let (to, padding) = to.split_at_mut(ids.len());
+            padding.fill(-OUT_OF_RANGE);
+            let parts = to.par_chunks_mut(MIN_PARTICLES_PER_TASK).zip(order.par_chunks(MIN_PARTICLES_PER_TASK));
+            parts.for_each(|(to, order)| {
+                for (to, index) in to.iter_mut().zip(order) {
+                    *to = limit_to_range(from[*index as usize]);
+                }
+            });
         });
-        self.positions = sorted;
-        self.ids.clear();
-        self.ids.par_extend(self.order.par_iter().with_min_len(MIN_PARTICLES_PER_TASK).map(|i| ids[*i as usize]));
-        self.chunk_rows();
-        let rows = CellRows { keys: &self.keys, occupied: &self.occupied };
+        cell_rows::chunk_rows(&self.layout, &self.sorted.keys, &mut self.row_chunks);
+        cell_rows::find_starts(&self.layout, &self.sorted.keys, &mut self.starts);
+        let rows = CellRows { layout: &self.layout, keys: &self.sorted.keys, starts: &self.starts };
         GroupBatch::find_all(
             &mut self.batches,
             self.positions.each_ref().map(Vec::as_slice),
@@ -135,59 +126,16 @@ impl<const D: usize> Cells<D> {
     pub fn sort(&mut self, positions: [&[f32]; D], ids: &[u64]) {
         self.sort_by_cell(positions, ids);
         self.positions.iter_mut().for_each(Vec::clear);
-        self.ids.clear();
         self.batches.clear();
     }
 
-    /// Determines the order and the occupied cells.
+    /// Determines the order.
     fn sort_by_cell(&mut self, positions: [&[f32]; D], ids: &[u64]) {
-        assert!(ids.len() <= 1 << 27, "particles are counted in 32 bits");
+        assert!(ids.len() <= 1 << INDEX_BITS, "particles are counted in 32 bits");
         assert!(positions.iter().all(|component| component.len() == ids.len()), "one position per id");
-        let scale = 1.0 / (self.support_radius * CELL_SIZE_MARGIN);
-        let mut bounds = [[0; 2]; D];
-        let axes = self.coordinates.par_iter_mut().zip(positions).zip(&mut bounds);
-        axes.enumerate().for_each(|(c, ((cells, component), bounds))| {
-            let along = if c == 0 { CELLS_PER_RADIUS_X } else { 1 };
-            let (scale, max_coordinate) = (scale * along as f32, (MAX_CELL_COORDINATE * along) as f32);
-            dispatch!(bansho_base::math::simd::level(), _simd => *bounds = cell_coordinates(component, scale, max_coordinate, cells));
-        });
-        self.order.clear();
-        self.occupied.clear();
-        if !ids.is_empty() {
-            self.sort_by_key(ids, &bounds);
-        }
-    }
-
-    /// Sorts by key, then by id, and lists the occupied cells; `bounds` are the first and last cell along each axis.
-    fn sort_by_key(&mut self, ids: &[u64], bounds: &[[i32; 2]; D]) {
-        let Self { coordinates, sorting, order, occupied, .. } = self;
-        let keys = Keys::new(bounds.map(|[first, _]| first), bounds.map(|[_, last]| last));
-        sorting.sort(|index| keys.key(coordinates, index), keys.bits, ids, order, occupied);
-        occupied.resize(occupied.len() + SEARCH_WIDTH, Cell { key: u64::MAX, start: ids.len() as u32 });
-        self.keys = keys;
-    }
-
-    /// Splits every row of cells into chunks of up to [`BATCH`] particles.
-    fn chunk_rows(&mut self) {
-        self.row_chunks.clear();
-        let mut row = u64::MAX;
-        for pair in self.occupied.windows(2) {
-            let (key, mut start) = (pair[0].key, pair[0].start);
-            let same_row = std::mem::replace(&mut row, self.keys.row(key)) == self.keys.row(key);
-            if let Some(chunk) =
-                self.row_chunks.last_mut().filter(|chunk| same_row && key - chunk.first <= MAX_GROUP_LENGTH)
-            {
-                let end = pair[1].start.min(chunk.particles.start + BATCH as u32);
-                if end > start {
-                    (chunk.particles.end, chunk.last, start) = (end, key, end);
-                }
-            }
-            while start < pair[1].start {
-                let end = pair[1].start.min(start + BATCH as u32);
-                self.row_chunks.push(RowChunk { particles: start..end, first: key, last: key });
-                start = end;
-            }
-        }
+        let keys = CellKeys::new(positions, self.support_radius);
+        self.sorting.sort(&keys, ids, &mut self.sorted);
+        self.layout = keys.layout;
     }
 
     /// Permutes values from the order of the arguments of [`Cells::assign`] into the sorted order.
@@ -195,8 +143,9 @@ impl<const D: usize> Cells<D> {
     /// # Panics
     /// If there is not one value per particle.
     pub fn reorder<T: Copy + Send + Sync>(&self, values: &mut Vec<T>) {
-        assert_eq!(values.len(), self.order.len(), "one value per particle");
-        *values = self.order.par_iter().with_min_len(MIN_PARTICLES_PER_TASK).map(|i| values[*i as usize]).collect();
+        assert_eq!(values.len(), self.sorted.order.len(), "one value per particle");
+        *values =
+            self.sorted.order.par_iter().with_min_len(MIN_PARTICLES_PER_TASK).map(|i| values[*i as usize]).collect();
     }
 
     /// As [`Cells::reorder`] for many arrays of `f32`, with scratch memory that is reused.
@@ -206,7 +155,7 @@ impl<const D: usize> Cells<D> {
     pub fn reorder_all<'a>(&mut self, arrays: impl IntoIterator<Item = &'a mut Vec<f32>>) {
         let mut arrays: Vec<&mut Vec<f32>> = arrays.into_iter().collect();
         let threads = parallel::current_num_threads().clamp(1, arrays.len().max(1));
-        let Self { order, scratch, .. } = self;
+        let Self { sorted: SortedParticles { order, .. }, scratch, .. } = self;
         scratch.resize_with(threads, Vec::new);
         let arrays_per_thread = arrays.len().div_ceil(threads).max(1);
         arrays.par_chunks_mut(arrays_per_thread).zip(scratch).for_each(|(arrays, scratch)| {
@@ -219,9 +168,27 @@ impl<const D: usize> Cells<D> {
         });
     }
 
+    /// Permutes the positions and ids that were given to [`Cells::assign`] into the sorted order: it has done so already, and copying takes less time than
+    /// [`Cells::reorder`].
+    ///
+    /// # Panics
+    /// If there is not one position and one id per particle, or the particles were sorted by [`Cells::sort`].
+    pub fn reorder_assigned(&self, positions: [&mut Vec<f32>; D], ids: &mut [u64]) {
+        positions.into_par_iter().zip(&self.positions).for_each(|(values, sorted)| {
+            let sorted = &sorted[..self.len()];
+            // Numbers that may stand for others.
+            if contains(sorted, OUT_OF_RANGE) {
+                self.reorder(values);
+            } else {
+                values.copy_from_slice(sorted);
+            }
+        });
+        ids.copy_from_slice(&self.sorted.ids);
+    }
+
     /// Particle ids in sorted order.
     pub(super) fn ids(&self) -> &[u64] {
-        &self.ids
+        &self.sorted.ids
     }
 
     /// Positions in sorted order, one array per component, padded with one batch that is out of range.
@@ -240,17 +207,7 @@ fn limit_to_range(x: f32) -> f32 {
     if x.abs() < OUT_OF_RANGE { x } else { OUT_OF_RANGE }
 }
 
-/// Cell coordinates of one component, `scale` cells per unit; returns the minimum and the maximum. `floor` is avoided: without
-/// SSE4.1 it is a function call.
-#[inline(always)]
-fn cell_coordinates(component: &[f32], scale: f32, max_coordinate: f32, cells: &mut Vec<i32>) -> [i32; 2] {
-    cells.resize(component.len(), 0);
-    let (mut first, mut last) = (i32::MAX, i32::MIN);
-    for (cell, value) in cells.iter_mut().zip(component) {
-        let scaled = (value * scale).clamp(-max_coordinate, max_coordinate);
-        let truncated = scaled as i32;
-        *cell = truncated - i32::from(truncated as f32 > scaled);
-        (first, last) = (first.min(*cell), last.max(*cell));
-    }
-    [first, last]
+/// Whether a number occurs in an array. The loop does not end where it is found, so that it vectorizes.
+fn contains(values: &[f32], number: f32) -> bool {
+    values.iter().fold(false, |found, value| found | (*value == number))
 }

@@ -27,8 +27,8 @@
 //! | Courant-Friedrichs-Lewy condition | | | [`max_stable_step`], [`substep_count`] |
 //!
 //! # Data flow
-//! 1. [`Particles::sort`] hands positions and ids to [`Cells::assign`] (`cells`), which sorts by cell key and id (`sorting`: a sample sort
-//!    by ranges of keys, a radix sort within each) and lists the occupied cells.
+//! 1. [`Particles::sort`] hands positions and ids to [`Cells::assign`] (`cells`), which sorts by cell key (`cell_keys`) and id (`sorting`: a
+//!    sample sort by ranges of keys, a counting sort or a radix sort within each) and notes where each cell begins.
 //! 2. Rows of cells (`cell_rows`) are divided into groups of up to eight consecutive particles, each with its list of candidate neighbors
 //!    (`neighbor_groups`).
 //! 3. [`Cells::reorder`] permutes the caller's other arrays into the sorted order.
@@ -107,6 +107,7 @@
 //! # Ok::<(), bansho_sph::SphError>(())
 //! ```
 
+mod cell_keys;
 mod cell_rows;
 mod cells;
 mod error;

@@ -105,8 +105,8 @@ impl<const D: usize> Particles<D> {
     /// If the arrays differ in length ([`check`](Self::check) tells), or there are more than 2^27 particles.
     pub fn sort(&mut self, cells: &mut Cells<D>) {
         cells.assign(self.positions.each_ref().map(Vec::as_slice), &self.ids);
-        cells.reorder_all(self.positions.iter_mut().chain(&mut self.velocities).chain([&mut self.masses]));
-        self.ids.copy_from_slice(cells.ids());
+        cells.reorder_assigned(self.positions.each_mut(), &mut self.ids);
+        cells.reorder_all(self.velocities.iter_mut().chain([&mut self.masses]));
     }
 
     /// Semi-implicit (symplectic) Euler: `v += a dt`, then `x += v dt`.

@@ -379,6 +379,10 @@ fn particles_may_be_anywhere() {
     let of = |id: u64| density[particles.ids.iter().position(|other| *other == id).unwrap()];
     assert_eq!((of(0), of(8)), (alone, alone));
     assert!(of(1) > alone && of(1) == of(2), "neighbors farther out than the farthest cell");
+    for (id, x) in (0..).zip(far) {
+        let index = particles.ids.iter().position(|other| *other == id).unwrap();
+        assert_eq!(particles.positions[1][index].to_bits(), (-x).to_bits(), "sorting does not move particle {id}");
+    }
 }
 
 #[test]

@@ -1,10 +1,14 @@
 //! Particles as a structure of arrays.
 
+use std::ops::Range;
+
 use bansho_base::{host::parallel::prelude::*, math::DVec3};
 use bansho_sph::{Cells, retain};
 
 /// Number of `f32` columns.
 pub(crate) const FLOAT_COLUMNS: usize = 21;
+/// Indices of the position columns.
+const POSITION: Range<usize> = 0..3;
 /// Index of the density column.
 const DENSITY: usize = 14;
 
@@ -129,9 +133,10 @@ impl GasParticles {
     /// Sorts the particles, and the column `companion` with them, by cell, then by id. Densities are not sorted, since they are recomputed afterwards.
     pub(crate) fn sort(&mut self, cells: &mut Cells<3>, companion: &mut Vec<f32>) {
         cells.assign(self.positions(), &self.id);
-        cells.reorder(&mut self.id);
+        cells.reorder_assigned(self.position.each_mut(), &mut self.id);
         cells.reorder(&mut self.burner);
-        let arrays = self.float_columns_mut().into_iter().enumerate().filter(|(number, _)| *number != DENSITY);
+        let arrays = self.float_columns_mut().into_iter().enumerate();
+        let arrays = arrays.filter(|(number, _)| !POSITION.contains(number) && *number != DENSITY);
         cells.reorder_all(arrays.map(|(_, values)| values).chain([companion]));
     }
 
