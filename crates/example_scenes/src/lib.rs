@@ -10,7 +10,7 @@
 //! assert!(files.iter().all(|(path, bytes)| path.ends_with(".glb") && !bytes.is_empty()));
 //! ```
 
-use std::{borrow::Cow, io};
+use std::{borrow::Cow, io, path::PathBuf};
 
 pub mod plates;
 
@@ -29,23 +29,30 @@ include!(concat!(env!("OUT_DIR"), "/scenes.rs"));
 
 /// A file of an example cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub enum ReadAssetError {
-    /// A plate is in no folder where plates are looked for.
+#[error("{path}: {problem}")]
+pub struct ReadAssetError {
+    /// The path that the scene names.
+    pub path: String,
+    /// What is wrong.
+    pub problem: ReadAssetProblem,
+}
+
+/// Why a file of an example cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadAssetProblem {
+    /// It is in no folder where plates are looked for.
     #[error(
-        "{path}: this plate is not in the program, and not in {}; allowed: the folder `scenes` of a release archive or of the \
-         repository, named by the environment variable {}",
+        "this plate is not in the program, and not in {}; allowed: the folder `scenes` of a release archive or of the repository, \
+         named by the environment variable {}",
         plates::searched_folders(),
         plates::FOLDER_VARIABLE
     )]
-    NotFound {
-        /// The path that the scene names.
-        path: String,
-    },
-    /// A plate was found and cannot be read.
-    #[error("{path}: {source}")]
+    NotFound,
+    /// It was found and cannot be read.
+    #[error("cannot read {}: {source}", .file.display())]
     Io {
         /// The file.
-        path: String,
+        file: PathBuf,
         /// Why it cannot be read.
         source: io::Error,
     },
@@ -92,7 +99,10 @@ pub fn embedded_asset(path: &str) -> Option<&'static [u8]> {
 pub fn read_asset(path: &str) -> Result<Cow<'static, [u8]>, ReadAssetError> {
     match embedded_asset(path) {
         Some(bytes) => Ok(Cow::Borrowed(bytes)),
-        None => plates::read(path).map(Cow::Owned),
+        None => match plates::read(path) {
+            Ok(bytes) => Ok(Cow::Owned(bytes)),
+            Err(problem) => Err(ReadAssetError { path: path.to_owned(), problem }),
+        },
     }
 }
 

@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{PLATES, ReadAssetError};
+use crate::{PLATES, ReadAssetProblem};
 
 /// The environment variable that names the folder of scenes.
 pub const FOLDER_VARIABLE: &str = "BANSHO_SCENES";
@@ -27,9 +27,9 @@ pub fn find(named: &str) -> Option<PathBuf> {
 }
 
 /// Reads a plate, by the path that a scene names.
-pub(crate) fn read(named: &str) -> Result<Vec<u8>, ReadAssetError> {
-    let file = find(named).ok_or_else(|| ReadAssetError::NotFound { path: named.to_owned() })?;
-    fs::read(&file).map_err(|source| ReadAssetError::Io { path: file.display().to_string(), source })
+pub(crate) fn read(named: &str) -> Result<Vec<u8>, ReadAssetProblem> {
+    let file = find(named).ok_or(ReadAssetProblem::NotFound)?;
+    fs::read(&file).map_err(|source| ReadAssetProblem::Io { file, source })
 }
 
 /// The folders where plates are looked for, for an error message.

@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, path::Path, sync::Arc};
 
-use bansho_example_scenes::plates;
+use bansho_example_scenes::{ReadAssetError, plates};
 
 use bansho::{
     Assets, MemoryAssets,
@@ -49,14 +49,18 @@ impl BundledAssets {
 
     /// The bytes of the file `name`, if there is one.
     pub fn bytes(&self, name: &str) -> Option<Cow<'_, [u8]>> {
-        match self.added_file(name) {
-            Some(bytes) => Some(Cow::Borrowed(bytes)),
-            None => bansho_example_scenes::read_asset(name).ok(),
-        }
+        self.require(name).ok()
     }
 
     fn require(&self, name: &str) -> Result<Cow<'_, [u8]>, AssetError> {
-        self.bytes(name).ok_or_else(|| error(name, AssetProblem::Missing))
+        if let Some(bytes) = self.added_file(name) {
+            return Ok(Cow::Borrowed(bytes));
+        }
+        bansho_example_scenes::read_asset(name).map_err(|ReadAssetError { problem, .. }| {
+            // A page has no folders, and tells itself what could not be fetched.
+            let is_told = is_plate(name) && cfg!(not(target_arch = "wasm32"));
+            error(name, if is_told { AssetProblem::Reported(problem.to_string()) } else { AssetProblem::Missing })
+        })
     }
 
     /// These files, and `files` for all other names.
@@ -73,7 +77,7 @@ pub struct OverlayAssets {
 
 impl OverlayAssets {
     fn source(&self, name: &str) -> &dyn Assets {
-        if self.bundle.contains(name) { &self.bundle } else { self.files.as_ref() }
+        if self.bundle.contains(name) || is_plate(name) { &self.bundle } else { self.files.as_ref() }
     }
 }
 
@@ -109,6 +113,11 @@ impl Assets for OverlayAssets {
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
         self.source(path).digest(path, frame)
     }
+}
+
+/// Whether a file is a plate of the example scenes.
+fn is_plate(name: &str) -> bool {
+    plates::path_in_scenes(name).is_some()
 }
 
 fn error(name: &str, problem: AssetProblem) -> AssetError {
@@ -163,7 +172,7 @@ impl Assets for BundledAssets {
 
     fn digest(&self, path: &str, frame: i64) -> Result<[u8; 32], AssetError> {
         if !self.contains(path) {
-            return Err(error(path, AssetProblem::Missing));
+            self.require(path)?;
         }
         // The name suffices: within a process its content never changes, unless a file is added, which creates a new bundle.
         let mut named = MemoryAssets::default();
