@@ -4,8 +4,8 @@
 use std::hint::black_box;
 
 use bansho_base::color::{
-    ACESCG_FROM_XYZ, AlphaConvention, SRGB_FROM_ACESCG, View, black_body, luminance, planck_radiance_per_nm,
-    xyz_of_spectrum,
+    ACESCG_FROM_XYZ, AlphaConvention, SRGB_FROM_ACESCG, View, black_body, decode_srgb, luminance,
+    planck_radiance_per_nm, xyz_of_spectrum,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use fearless_simd::Level;
@@ -99,6 +99,22 @@ fn view(criterion: &mut Criterion) {
         bencher.iter(|| {
             scene.copy_from_slice(&plate);
             View::DISPLAY.to_scene_row(level, &mut scene);
+        });
+    });
+    let codes: Vec<[u8; 4]> = plate.iter().map(|p| p.map(|v| (255.0 * v).round() as u8)).collect();
+    group.bench_function("photograph_to_scene/codes", |bencher| {
+        bencher.iter(|| {
+            for (codes, scene) in black_box(&codes).chunks(WIDTH).zip(scene.chunks_mut(WIDTH)) {
+                View::DISPLAY.codes_to_scene_row(level, codes, scene);
+            }
+        });
+    });
+    group.bench_function("photograph_to_scene/naive", |bencher| {
+        bencher.iter(|| {
+            for ([r, g, b, _], scene) in black_box(&codes).iter().zip(&mut scene) {
+                let [r, g, b] = View::DISPLAY.to_scene([r, g, b].map(|code| decode_srgb(f32::from(*code) / 255.0)));
+                *scene = [r, g, b, 1.0];
+            }
         });
     });
     group.finish();

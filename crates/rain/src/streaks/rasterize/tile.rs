@@ -157,6 +157,9 @@ impl Block {
     /// Loads it from a plane.
     #[inline(always)]
     fn load<S: Simd, C>(&self, simd: S, plane: &[f32], columns: &mut [C], rows: impl Fn(&mut C) -> &mut TileRows) {
+        if self.size == [TILE_ROWS; 2] {
+            return self.load_whole(simd, plane, columns, rows);
+        }
         let [width, height] = self.size;
         let mut square = [[0.0; TILE_ROWS]; TILE_ROWS];
         for y in 0..height {
@@ -168,9 +171,32 @@ impl Block {
         }
     }
 
+    /// [`load`](Self::load) of eight columns and rows, as nearly all blocks have, by loops whose lengths are known when it is compiled.
+    #[inline(always)]
+    fn load_whole<S: Simd, C>(
+        &self,
+        simd: S,
+        plane: &[f32],
+        columns: &mut [C],
+        rows: impl Fn(&mut C) -> &mut TileRows,
+    ) {
+        let mut square = [[0.0; TILE_ROWS]; TILE_ROWS];
+        for y in 0..TILE_ROWS {
+            square[y].copy_from_slice(&plane[self.start + y * self.stride..][..TILE_ROWS]);
+        }
+        transpose(simd, &mut square);
+        let columns = &mut columns[self.column..][..TILE_ROWS];
+        for x in 0..TILE_ROWS {
+            *rows(&mut columns[x]) = square[x];
+        }
+    }
+
     /// Stores it into a plane.
     #[inline(always)]
     fn store<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &TileRows, plane: &mut [f32]) {
+        if self.size == [TILE_ROWS; 2] {
+            return self.store_whole(simd, columns, rows, plane);
+        }
         let [width, height] = self.size;
         let mut square = [[0.0; TILE_ROWS]; TILE_ROWS];
         for x in 0..width {
@@ -179,6 +205,20 @@ impl Block {
         transpose(simd, &mut square);
         for y in 0..height {
             copy(&square[self.row + y][..width], &mut plane[self.start + y * self.stride..][..width]);
+        }
+    }
+
+    /// [`store`](Self::store) of eight columns and rows.
+    #[inline(always)]
+    fn store_whole<S: Simd, C>(&self, simd: S, columns: &[C], rows: impl Fn(&C) -> &TileRows, plane: &mut [f32]) {
+        let columns = &columns[self.column..][..TILE_ROWS];
+        let mut square = [[0.0; TILE_ROWS]; TILE_ROWS];
+        for x in 0..TILE_ROWS {
+            square[x] = *rows(&columns[x]);
+        }
+        transpose(simd, &mut square);
+        for y in 0..TILE_ROWS {
+            plane[self.start + y * self.stride..][..TILE_ROWS].copy_from_slice(&square[y]);
         }
     }
 }
