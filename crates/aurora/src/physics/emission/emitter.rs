@@ -151,7 +151,7 @@ fn color(set: LineSet, emitter: SpectralEmitter) -> [f64; 3] {
 
 /// Radiance of a kilorayleigh at a wavelength, W m^-2 sr^-1: 10^13 photons m^-2 s^-1 over the full sphere (Hunten et al.
 /// 1956).
-fn watts_per_kilorayleigh(wavelength_nm: f64) -> f64 {
+pub(super) fn watts_per_kilorayleigh(wavelength_nm: f64) -> f64 {
     let photon = PLANCK_TIMES_LIGHT_SPEED / (wavelength_nm * 1e-9);
     PHOTONS_PER_KILORAYLEIGH / (4.0 * std::f64::consts::PI) * photon
 }
@@ -191,7 +191,7 @@ const RGB_FROM_XYZ: Matrix3 =
 /// Linear sRGB of a line of a radiance in W m^-2 sr^-1, (2.29) with K = 683 lm/W and (2.30). The line is the nearest of the five. Components are negative
 /// where the line lies outside sRGB.
 #[must_use]
-fn table_2_1_srgb(wavelength_nm: f64, radiance: f64) -> [f64; 3] {
+pub(super) fn table_2_1_srgb(wavelength_nm: f64, radiance: f64) -> [f64; 3] {
     let nearest =
         TABLE_2_1.iter().min_by(|(a, _), (b, _)| (a - wavelength_nm).abs().total_cmp(&(b - wavelength_nm).abs()));
     let xyz = nearest.map_or([0.0; 3], |(_, xyz)| xyz.map(|value| LUMINOUS_EFFICACY_LM_PER_W * radiance * value));

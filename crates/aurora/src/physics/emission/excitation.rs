@@ -195,7 +195,10 @@ mod tests {
     use super::*;
     use crate::physics::{
         atmosphere::{LEVELS, atmosphere},
-        emission::{Emission, PHOTONS_PER_KILORAYLEIGH},
+        emission::{
+            Emission, PHOTONS_PER_KILORAYLEIGH,
+            emitter::{LineSet, table_2_1_srgb, watts_per_kilorayleigh},
+        },
         precipitation::{electron_track::TrackSampler, energy_grid::ARC},
     };
 
@@ -305,6 +308,50 @@ mod tests {
         bansho_base::assert_measured!("equation (2.25): left at 170 km with 185 pm", left(170.0, 185e-12), 0.12, 0.006);
         bansho_base::assert_measured!("equation (2.25): left at 190 km with 185 pm", left(190.0, 185e-12), 0.33, 0.006);
         assert!(hard_sphere_quenching(SpectralEmitter::NitrogenIon, &atmosphere().at(110.0), 1.85e-10) < 1e-3);
+    }
+
+    /// Color of the mean light at an altitude by the rules of the thesis, with quenching by spheres of a radius (pm): linear sRGB by table 2.1 and (2.30).
+    fn color_by_the_rules(altitude_km: f64, radius_pm: f64) -> [f64; 3] {
+        let photons = mean_hard_sphere_photons(&atmosphere().at(altitude_km), 1e-12 * radius_pm);
+        let mut color = [0.0; 3];
+        for emitter in EMITTERS {
+            for (wavelength_nm, per_photon) in LineSet::Thesis.lines(emitter) {
+                let srgb = table_2_1_srgb(wavelength_nm, watts_per_kilorayleigh(wavelength_nm));
+                (0..3).for_each(|c| color[c] += photons[emitter.index()] * per_photon * srgb[c]);
+            }
+        }
+        color
+    }
+
+    #[test]
+    fn the_rules_of_the_thesis_give_a_violet_border_and_red_tops_at_the_heights_of_the_page() {
+        // The first altitude, km, from 120 km on, at which a color is so.
+        let first = |radius_pm, is_so: &dyn Fn([f64; 3]) -> bool| {
+            (1200..6000)
+                .map(|step| f64::from(step) / 10.0)
+                .find(|altitude| is_so(color_by_the_rules(*altitude, radius_pm)))
+        };
+        for (radius_pm, green_is_positive, green_exceeds_red, green_exceeds_blue, red_exceeds_green) in
+            [(100.0, 136.0, 144.0, 157.0, 330.0), (30.0, 120.0, 120.0, 130.0, 220.0)]
+        {
+            let greener = first(radius_pm, &|[r, g, _]| g > r).unwrap();
+            let found = [
+                first(radius_pm, &|[_, g, _]| g > 0.0).unwrap(),
+                greener,
+                first(radius_pm, &|[_, g, b]| g > b).unwrap(),
+                (0..2500)
+                    .map(|step| greener + f64::from(step) / 10.0)
+                    .find(|altitude| {
+                        let [r, g, _] = color_by_the_rules(*altitude, radius_pm);
+                        r > g
+                    })
+                    .unwrap(),
+            ];
+            let expected = [green_is_positive, green_exceeds_red, green_exceeds_blue, red_exceeds_green];
+            for (found, expected) in found.into_iter().zip(expected) {
+                assert!((found - expected).abs() < 0.02 * expected, "{radius_pm} pm: {found} km, expected {expected}");
+            }
+        }
     }
 
     #[test]
