@@ -6,10 +6,11 @@ use bansho_base::host::parallel::{self, prelude::*};
 
 use super::{
     cell_keys::{CELLS_PER_RADIUS_X, KeyLayout},
-    neighbor_groups::BATCH,
     sorting::MIN_PARTICLES_PER_TASK,
 };
 
+/// Particles per batch of neighbor sums, and at most in a chunk.
+pub(super) const BATCH: usize = 8;
 /// Keys compared per iteration of a search, without branches: the length of a search is hard to predict.
 const SEARCH_WIDTH: usize = 8;
 /// Maximum length of a chunk, in cells along x: all particles within that length become candidates of its group.

@@ -9,9 +9,9 @@ use bansho_base::host::parallel::{self, prelude::*};
 
 use super::{
     cell_keys::{CellKeys, KeyLayout},
-    cell_rows::{self, CellRows, RowChunk},
+    cell_rows::{self, BATCH, CellRows, RowChunk},
     error::SphError,
-    neighbor_groups::{BATCH, GroupBatch},
+    neighbor_groups::GroupBatch,
     sorting::{INDEX_BITS, MIN_PARTICLES_PER_TASK, SampleSort, SortedParticles},
 };
 

@@ -2,7 +2,7 @@
 //!
 //! The batch operations loop over arrays instead of calling `map`: its closures do not vectorize.
 
-use super::cell_rows::{CellRows, RowChunk};
+use super::cell_rows::{BATCH, CellRows, RowChunk};
 use bansho_base::{
     host::parallel::prelude::*,
     math::simd::{HalfLanes, Real},
@@ -181,9 +181,6 @@ impl GroupBatch {
         }
     }
 }
-
-/// Particles per batch.
-pub(super) const BATCH: usize = 8;
 
 /// Squared length of an offset.
 #[inline(always)]

@@ -16,7 +16,10 @@ use super::{
     cells::Cells,
     neighbor_groups::{Group, GroupBatch},
 };
-use crate::neighbor_groups::{BATCH, length_squared, load, splat_all, subtract, truncate_all, values_at};
+use crate::{
+    cell_rows::BATCH,
+    neighbor_groups::{length_squared, load, splat_all, subtract, truncate_all, values_at},
+};
 use fearless_simd::{Simd, dispatch, prelude::*};
 
 /// Particles closer than this fraction of the support radius count as coincident.
