@@ -6,14 +6,14 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError, TryLockError,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU32, Ordering},
         mpsc::{self, RecvTimeoutError},
     },
     time::Duration,
 };
 
 use bansho::Observer;
-use pyo3::prelude::*;
+use pyo3::{exceptions::PyRuntimeError, prelude::*};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error;
@@ -156,11 +156,15 @@ fn in_pool<R: Send>(
 ///
 /// The thread that calls takes it before its work enters the pool. A worker that took it within a job could wait there for itself: while it waits for the
 /// parts of one job, it takes on others.
-pub(crate) struct PoolMutex<T>(Mutex<Option<T>>);
+pub(crate) struct PoolMutex<T> {
+    value: Mutex<Option<T>>,
+    /// The process that used it last.
+    process: AtomicU32,
+}
 
 impl<T: Send> PoolMutex<T> {
     pub(crate) fn new(value: T) -> Self {
-        Self(Mutex::new(Some(value)))
+        Self { value: Mutex::new(Some(value)), process: AtomicU32::new(std::process::id()) }
     }
 
     /// Does `work` with it in a pool of `threads`, as [`run`].
@@ -195,21 +199,41 @@ impl<T: Send> PoolMutex<T> {
     }
 
     /// Waits until no other thread uses it; signals are handled meanwhile.
+    ///
+    /// # Errors
+    /// The exception of a signal handler; `RuntimeError` in a child process, if a thread of its parent used it during the fork.
     fn take(&self) -> PyResult<MutexGuard<'_, Option<T>>> {
         let mut waited = Duration::ZERO;
+        let own = std::process::id();
         loop {
-            match self.0.try_lock() {
-                Ok(guard) => return Ok(guard),
-                Err(TryLockError::Poisoned(poisoned)) => return Ok(poisoned.into_inner()),
-                Err(TryLockError::WouldBlock) => std::thread::sleep(RETRY),
-            }
-            waited += RETRY;
-            if waited >= POLL {
-                waited = Duration::ZERO;
-                Python::attach(|py| py.check_signals())?;
-            }
+            let guard = match self.value.try_lock() {
+                Ok(guard) => guard,
+                Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+                Err(TryLockError::WouldBlock) => {
+                    std::thread::sleep(RETRY);
+                    waited += RETRY;
+                    if waited >= POLL {
+                        waited = Duration::ZERO;
+                        if self.process.load(Ordering::Relaxed) != own {
+                            // Held by a thread that does not exist in this process.
+                            return Err(forked());
+                        }
+                        Python::attach(|py| py.check_signals())?;
+                    }
+                    continue;
+                }
+            };
+            self.process.store(own, Ordering::Relaxed);
+            return Ok(guard);
         }
     }
+}
+
+/// A thread of the parent process was using it.
+fn forked() -> PyErr {
+    PyRuntimeError::new_err(
+        "another thread was using this object when this process was forked; allowed: an object that is opened in this process",
+    )
 }
 
 /// An earlier call panicked.

@@ -70,11 +70,47 @@ def test_wrong_arguments_of_rain(arguments, message):
         (lambda: bansho.datasets.RainPairs([IMAGE], per_image="two"), "per_image: 'two'; allowed: 1 or more"),
         (lambda: bansho.datasets.AllSkyAurora(1.5), "count: 1.5; allowed: 1 or more"),
         (lambda: next(bansho.datasets.iterate([1], workers="all")), "workers: 'all'; allowed: 0 or more"),
+        (lambda: bansho.open({}, seed=-1), "seed: -1; allowed: a whole number from 0 to 9e15"),
+        (lambda: bansho.Effect(bansho.FlameSheet(), seed=-1), "seed: -1; allowed: a whole number from 0 to 9e15"),
+        (lambda: bansho.Effect(bansho.FlameSheet(), max_steps=-1), "max_steps: -1; allowed: a whole number above 0"),
+        (lambda: bansho.Effect(bansho.FlameSheet(), size=(8, 8)).set_size(-1, 4), "width: -1; allowed: a whole number from 1 to 65536"),
+        (lambda: bansho.open({"flame_sheet": [{}]}, size=(8, 8)).render(2**70), "a frame number: 1180591620717411303424; allowed: a whole number"),
+        (lambda: bansho.streaks(size=-1), "size: -1; allowed: 1 to 65536 pixels"),
+        (lambda: bansho.streaks(size=3.5), "size: 3.5; allowed: 1 to 65536 pixels"),
+        (lambda: bansho.streaks(seed=-1), "seed: -1; allowed: a whole number from 0 to 9e15"),
+        (lambda: bansho.aurora_emission(np.array([1e3, 2e3])), r"energy_ev: array\(\[1000., 2000.\]\); allowed: a number"),
+        (lambda: bansho.drop_sizes("x"), "rate_mm_per_h: 'x'; allowed: a number"),
+        (lambda: bansho.rain(IMAGE.astype(np.int32)), "image: an array of int32; allowed: uint8 .sRGB., float16"),
+        (lambda: bansho.labels.boxes([1]), r"mask: an array of shape \(1,\); allowed: \(height, width\)"),
+        (lambda: bansho.transforms.Rain((5, 500)), r"rate_mm_per_h: \(5, 500\); allowed: rates above 0, up to 300"),
+        (lambda: bansho.transforms.Rain(exposure_s=0), "exposure_s: 0; allowed: times above 0 s"),
     ],
 )
 def test_wrong_arguments_of_others(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: bansho.transforms.Rain(foo=1),
+        lambda: bansho.transforms.Fog(foo=1),
+        lambda: bansho.datasets.RainPairs([IMAGE], foo=1),
+    ],
+)
+def test_options_that_do_not_exist_are_told_at_once(call):
+    with pytest.raises(TypeError, match="unknown option 'foo'; allowed: camera, pose"):
+        call()
+
+
+def test_no_pictures_make_none():
+    assert bansho.rain(np.zeros((0, 9, 9, 3), np.uint8), strength=1).shape == (0, 9, 9, 3)
+
+
+def test_numbers_of_any_byte_order_are_numbers():
+    light = np.random.default_rng(1).random((18, 32, 3), np.float32)
+    assert np.array_equal(bansho.rain(light.astype(">f4"), strength=5), bansho.rain(light, strength=5))
 
 
 class NoBuffer:

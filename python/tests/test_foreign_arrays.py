@@ -54,6 +54,13 @@ def test_an_effect_writes_into_the_memory_of_others():
     codes = array.array("B", bytes(SIZE[0] * SIZE[1] * 4))
     effect.display(memoryview(codes).cast("B", (*SIZE, 4)))
     assert np.array_equal(np.frombuffer(codes, np.uint8).reshape(*SIZE, 4), effect.display())
+    # Memory without a shape has that of the picture.
+    flat = bytearray(SIZE[0] * SIZE[1] * 4)
+    effect.display(flat)
+    assert bytes(flat) == bytes(codes)
+    depths = array.array("f", bytes(SIZE[0] * SIZE[1] * 4))
+    effect.depth(depths)
+    assert np.array_equal(np.frombuffer(depths, np.float32).reshape(SIZE), effect.depth())
 
 
 def test_tensors_of_torch_are_read_and_written(inputs):

@@ -244,7 +244,7 @@ def test_progress_is_told_and_options_are_checked(torch_scene, tmp_path):
             bansho.open(torch_scene, **options)
     with pytest.raises(ValueError, match='alpha: "sraight"; allowed: "encoded", "linear"'):
         bansho.open(torch_scene).display(0, alpha="sraight")
-    with pytest.raises(ValueError, match="a frame number of type str"):
+    with pytest.raises(ValueError, match="a frame number: '1'; allowed: a whole number"):
         bansho.open(torch_scene).render("1")
 
 

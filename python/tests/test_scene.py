@@ -102,5 +102,15 @@ def test_files_are_read_and_missing_ones_named(tmp_path):
     path = tmp_path / "wet.toml"
     bansho.Scene.parse(TEXT).save(path)
     assert bansho.Scene.load(path).to_toml() == TEXT
-    with pytest.raises(OSError, match="wett.toml.*did you mean .*wet.toml"):
+    with pytest.raises(FileNotFoundError, match="wett.toml.*did you mean .*wet.toml"):
         bansho.Scene.load(tmp_path / "wett.toml")
+
+
+def test_tables_and_values_that_are_stated_are_in_a_scene():
+    scene = bansho.Scene.parse("bansho = 2\n[fog]\nvisibility_m = 80.0\n[[rain]]\nsplashes = { fraction = 0.2 }\n[[rain]]\nname = \"far\"\n")
+    assert list(scene) == ["bansho", "fog", "rain"]
+    assert all(path in scene for path in ("fog", "fog.visibility_m", "rain", "rain.0.splashes.fraction", "rain.1.name"))
+    assert not any(path in scene for path in ("camera", "fog.visibility", "rain.2", "rain.1.splashes", "rain.0.splashes.fraction.x"))
+    scene.add(bansho.Camera())
+    del scene["rain.1"]
+    assert "camera" in scene and "rain.splashes" in scene

@@ -1,5 +1,6 @@
 """The keyword builders and their stub are those of the descriptors."""
 
+import inspect
 import ast
 from pathlib import Path
 
@@ -49,3 +50,9 @@ def test_a_builder_of_defaults_makes_a_scene():
     for table in _bansho.table_descriptors():
         builder = getattr(bansho, "".join(word.capitalize() for word in table["key"].split("_")))
         assert bansho.Scene([builder()]).to_toml()
+
+
+def test_builders_have_a_signature_that_notebooks_complete():
+    parameters = inspect.signature(bansho.FlameSheet).parameters
+    assert list(parameters) == list(bansho.FlameSheet.parameters) and "width" in parameters
+    assert all(parameter.kind is inspect.Parameter.KEYWORD_ONLY for parameter in parameters.values())

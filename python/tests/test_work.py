@@ -192,6 +192,37 @@ def test_threads_that_share_a_shot_and_an_effect_wait_for_each_other():
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_process_that_is_forked_while_a_thread_draws_is_told_so():
+    scene = bansho.Scene([bansho.Picture(size=(64, 36)), bansho.FlameParticles(particles=3000)])
+    shot, effect, stop = bansho.open(scene), bansho.Effect(scene), threading.Event()
+
+    def draw(call):
+        while not stop.is_set():
+            call()
+
+    def refused(call):
+        try:
+            call()
+        except RuntimeError as told:
+            return str(told)
+        return "done"
+
+    for number, call in enumerate((lambda: shot.render(20), effect.restart)):
+        thread = threading.Thread(target=draw, args=(call,), daemon=True)
+        thread.start()
+        try:
+            # Between two calls nobody uses it, so that a child may draw.
+            answers = {in_forked_process(lambda call=call: refused(call)) for _ in range(5)}
+        finally:
+            stop.set()
+            thread.join(30)
+            stop.clear()
+        allowed = "another thread was using this object when this process was forked; allowed: an object that is opened in this process"
+        assert answers <= {allowed, "done"} and allowed in answers, (number, answers)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_forked_process_draws_the_same():
     expected = rain_over_gray()
     assert in_forked_process(rain_over_gray) == expected

@@ -30,18 +30,40 @@ def as_numpy(array: Any, name: str) -> NDArray[Any]:
     return result
 
 
-def image(array: Any, name: str = "image") -> tuple[NDArray[Any], bool]:
-    """An image as codes (`uint8`) or floats, and whether floats stand for linear light."""
+def image(array: Any, name: str = "image", has_uint16: bool = True) -> tuple[NDArray[Any], bool]:
+    """An image as codes (`uint8`) or floats, and whether floats stand for linear light; codes of 16 bits become encoded floats, unless they are not allowed."""
     pixels = as_numpy(array, name)
     if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or 0 in pixels.shape:
         raise ValueError(f"{name}: an array of shape {pixels.shape}; allowed: (height, width, 3) or (height, width, 4)")
-    if pixels.dtype == np.uint8:
+    # Of any byte order.
+    kind = (pixels.dtype.kind, pixels.dtype.itemsize)
+    if kind == ("u", 1):
         return np.ascontiguousarray(pixels), False
-    if pixels.dtype == np.uint16:
+    if kind == ("u", 2) and has_uint16:
         return np.ascontiguousarray(pixels, dtype=np.float32) / np.float32(65535), False
-    if pixels.dtype in (np.float16, np.float32, np.float64):
+    if kind in (("f", 2), ("f", 4), ("f", 8)):
         return np.ascontiguousarray(pixels, dtype=np.float32), True
-    raise ValueError(f"{name}: an array of {pixels.dtype}; allowed: uint8 or uint16 (sRGB), float16, float32 or float64 (linear)")
+    codes = "uint8 or uint16" if has_uint16 else "uint8"
+    raise ValueError(f"{name}: an array of {pixels.dtype}; allowed: {codes} (sRGB), float16, float32 or float64 (linear)")
+
+
+def with_channels(array: NDArray[Any]) -> NDArray[Any]:
+    """A gray image, (H, W) or (H, W, 1), with three channels; any other as it is."""
+    if array.ndim == 2:
+        array = array[..., None]
+    return np.repeat(array, 3, axis=2) if array.ndim == 3 and array.shape[2] == 1 else array
+
+
+def depth_plane(array: NDArray[Any], is_scaled: bool, name: str) -> NDArray[np.float32]:
+    """A depth, (H, W) or (H, W, 1), as floats. Integers need a scale."""
+    plane = array[..., 0] if array.ndim == 3 and array.shape[2] == 1 else array
+    if plane.ndim != 2 or 0 in plane.shape:
+        raise ValueError(f"{name}: an array of shape {array.shape}; allowed: (height, width)")
+    if plane.dtype.kind not in "fui":
+        raise ValueError(f"{name}: an array of {plane.dtype}; allowed: floats in meters, or integers with depth_scale")
+    if plane.dtype.kind in "ui" and not is_scaled:
+        raise ValueError(f"{name}: an array of {plane.dtype} without depth_scale; allowed: plate.depth_scale in meters for each unit, such as 0.001 for millimeters")
+    return np.ascontiguousarray(plane, dtype=np.float32)
 
 
 def depth(array: Any, size: tuple[int, int], kind: str, scale: float | None, name: str = "depth") -> NDArray[np.float32]:

@@ -22,12 +22,20 @@ def number(value: Any, name: str, allowed: str = "a number") -> float:
     return result
 
 
-def whole(value: Any, name: str, allowed: str = "a whole number") -> int:
-    """A whole number: `int`, or an integer of numpy."""
+def whole(value: Any, name: str, allowed: str = "a whole number", least: int = -(2**53), most: int = 2**53) -> int:
+    """A whole number from `least` to `most`: `int`, or an integer of numpy."""
     try:
-        return int(value.__index__())
+        result = int(value.__index__())
     except (AttributeError, TypeError):
-        raise ValueError(f"{name}: {value!r}; allowed: {allowed}") from None
+        result = None
+    if result is None or not least <= result <= most:
+        raise ValueError(f"{name}: {shortened(value)}; allowed: {allowed}")
+    return result
+
+
+def seed(value: Any) -> int:
+    """A seed of random numbers."""
+    return whole(value, "seed", "a whole number from 0 to 9e15", 0, 9_000_000_000_000_000)
 
 
 def vector(value: Any, name: str) -> list[float]:

@@ -84,11 +84,11 @@ class FrameCamera:
     world_from_camera: NDArray[np.float64]
     """4 x 4: camera coordinates are right, up and backward (OpenGL, Blender)."""
     K: NDArray[np.float64]
-    """3 x 3: intrinsic matrix of a perspective lens in pixels, where the center of the upper left pixel is (0, 0) (OpenCV)."""
+    """3 x 3: intrinsic matrix of a perspective lens in pixels of `Frame.linear`, where the center of the upper left pixel is (0, 0) (OpenCV)."""
     lens: str
     """`"perspective"`, `"fisheye"` or `"panorama"`."""
     size: tuple[int, int]
-    """Width and height, pixels."""
+    """Width and height of `Frame.linear`, pixels."""
     shutter: tuple[float, float]
     """When the shutter opens and closes, s."""
 
@@ -106,14 +106,14 @@ class FrameCamera:
         return np.column_stack([pixels[:, :2] / pixels[:, 2:], local[:, 2]])
 
 
-def camera_of(values: Mapping[str, Any]) -> FrameCamera:
-    """The camera of what the compiled part says about it."""
+def camera_of(values: Mapping[str, Any], window: tuple[int, int, int, int]) -> FrameCamera:
+    """The camera of what the compiled part says about it, for the pixels of a window of the picture: x, y, width and height."""
     matrix = np.eye(4)
     matrix[:3, :3] = np.array(values["rotation"]).T
     matrix[:3, 3] = values["position"]
     focal, (x, y) = values["focal_pixels"], values["principal_point"]
-    intrinsic = np.array([[focal, 0.0, x - 0.5], [0.0, focal, y - 0.5], [0.0, 0.0, 1.0]])
-    return FrameCamera(matrix, intrinsic, values["lens"], tuple(values["size"]), tuple(values["shutter"]))
+    intrinsic = np.array([[focal, 0.0, x - window[0] - 0.5], [0.0, focal, y - window[1] - 0.5], [0.0, 0.0, 1.0]])
+    return FrameCamera(matrix, intrinsic, values["lens"], window[2:], tuple(values["shutter"]))
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ class Frame:
     @property
     def camera(self) -> FrameCamera:
         """The camera at the middle of its exposure."""
-        return camera_of(self._shot._shot.camera(self.number))
+        return self._shot.camera(self.number)
 
     @property
     def particles(self) -> dict[str, NDArray[Any]]:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _checks
+from . import _arrays, _checks
 from .frame import Frame
 
 __all__ = ["Box", "Category", "aurora_mask", "boxes", "coco", "fire_mask", "luminance_mask", "mask", "rain_mask", "rle", "smoke_mask", "yolo"]
@@ -116,7 +116,7 @@ class Box:
 
 def boxes(mask: NDArray[np.bool_], *, min_area: int = 1) -> list[Box]:
     """The bounding boxes of the connected parts (also over corners) of a mask, the largest part first."""
-    return [box for box, _ in _parts(mask, min_area)]
+    return [box for box, _ in _parts(_arrays.as_numpy(mask, "mask"), min_area)]
 
 
 def _parts(mask: NDArray[np.bool_], min_area: int) -> list[tuple[Box, NDArray[np.int64]]]:

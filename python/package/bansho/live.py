@@ -57,13 +57,13 @@ class Effect:
             described.name,
             stored_arrays(described, arrays),
             size=_checks.sides(size, "size"),
-            seed=None if seed is None else _checks.whole(seed, "seed", "a whole number from 0 to 9e15"),
+            seed=None if seed is None else _checks.seed(seed),
             loop_s=None if loop_s is None else _checks.number(loop_s, "loop_s", "a number of seconds"),
             backdrop=backdrop,
             layers=layers,
             aovs=aovs,
             shutter_s=None if shutter_s is None else _checks.number(shutter_s, "shutter_s", "a number of seconds"),
-            max_steps=None if max_steps is None else _checks.whole(max_steps, "max_steps", "a whole number above 0"),
+            max_steps=None if max_steps is None else _checks.whole(max_steps, "max_steps", "a whole number above 0", 1, 1_000_000_000),
             threads=_checks.threads(threads),
         )
 
@@ -89,7 +89,8 @@ class Effect:
 
     def set_size(self, width: int, height: int) -> None:
         """Sets the size of the picture, pixels."""
-        self._effect.set_size(_checks.whole(width, "width"), _checks.whole(height, "height"))
+        allowed = "a whole number from 1 to 65536"
+        self._effect.set_size(_checks.whole(width, "width", allowed, 1, 65536), _checks.whole(height, "height", allowed, 1, 65536))
 
     def set_exposure_ev100(self, exposure_ev100: float) -> None:
         """Sets the exposure value at ISO 100."""
@@ -150,12 +151,17 @@ class Effect:
             elif hasattr(out, "__dlpack__"):
                 buffer = np.from_dlpack(out)
             else:
+                # Bytes, or numbers without a shape.
                 buffer = np.asarray(memoryview(out))
+                if buffer.ndim == 1 and buffer.size == height * width * (4 if channels else 1):
+                    buffer = buffer.reshape(height, width, *channels)
         except (BufferError, RuntimeError, TypeError, ValueError) as reason:
             allowed = f"an array (height, width{', 4' if channels else ''}) of {np.dtype(dtype)} in main memory, such as one of numpy"
             raise ValueError(f"out: a {type(out).__name__} ({reason}); allowed: {allowed}") from None
         if buffer.dtype != dtype:
             raise ValueError(f"out: an array of {buffer.dtype}; allowed: {np.dtype(dtype)}")
+        if buffer.shape != (height, width, *channels):
+            raise ValueError(f"out: an array of shape {list(buffer.shape)}; allowed: {(height, width, *channels)}")
         if not buffer.flags["W"]:
             raise ValueError("out: cannot be written; allowed: a writable array in main memory")
         return buffer

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _bansho
+from . import _bansho, _checks
 
 __all__ = [
     "AuroraEmission",
@@ -32,10 +32,8 @@ Spectrum = Literal["gaussian", "maxwellian", "monoenergetic"]
 
 def _numbers(values: ArrayLike, name: str) -> tuple[list[float], tuple[int, ...]]:
     """Numbers in a list, and the shape of their array."""
-    array = np.asarray(values)
-    if array.dtype.kind not in "fiu":
-        raise ValueError(f"{name}: an array of {array.dtype}; allowed: numbers")
-    return array.astype(np.float64).ravel().tolist(), array.shape
+    array = _checks.numbers(values, name, "numbers")
+    return array.ravel().tolist(), array.shape
 
 
 @dataclass(frozen=True)
@@ -79,13 +77,13 @@ class DropSizes:
 def drop_sizes(rate_mm_per_h: float, diameter_mm: ArrayLike | None = None) -> DropSizes:
     """Number density of drops by diameter (by default 0 to 6 mm) at a rain rate."""
     diameters, _ = _numbers(np.linspace(0, 6, 121) if diameter_mm is None else diameter_mm, "diameter_mm")
-    density = _bansho.drop_density(float(rate_mm_per_h), diameters)
-    return DropSizes(float(rate_mm_per_h), np.array(diameters), density, _bansho.rain_extinction(float(rate_mm_per_h)))
+    density = _bansho.drop_density(_checks.number(rate_mm_per_h, "rate_mm_per_h"), diameters)
+    return DropSizes(_checks.number(rate_mm_per_h, "rate_mm_per_h"), np.array(diameters), density, _bansho.rain_extinction(_checks.number(rate_mm_per_h, "rate_mm_per_h")))
 
 
 def rain_extinction(rate_mm_per_h: float) -> float:
     """Extinction coefficient of rain, 1/m: light falls to exp(-beta d) over a distance d."""
-    return _bansho.rain_extinction(float(rate_mm_per_h))
+    return _bansho.rain_extinction(_checks.number(rate_mm_per_h, "rate_mm_per_h"))
 
 
 def terminal_velocity(
@@ -97,13 +95,13 @@ def terminal_velocity(
 ) -> NDArray[np.float64]:
     """Terminal velocity of raindrops, m/s: measured by Gunn and Kinzer (1949), or of rigid spheres."""
     diameters, shape = _numbers(diameter_mm, "diameter_mm")
-    return _bansho.terminal_velocity(diameters, law, float(temperature_k), float(pressure_pa)).reshape(shape)
+    return _bansho.terminal_velocity(diameters, law, _checks.number(temperature_k, "temperature_k"), _checks.number(pressure_pa, "pressure_pa")).reshape(shape)
 
 
 def streak_opacity(diameter_mm: ArrayLike, exposure_s: float) -> NDArray[np.float64]:
     """Opacity on the axis of the streak of a drop that falls at its terminal velocity: D / (v T), at most 1."""
     diameters, shape = _numbers(diameter_mm, "diameter_mm")
-    return _bansho.streak_opacity(diameters, float(exposure_s)).reshape(shape)
+    return _bansho.streak_opacity(diameters, _checks.number(exposure_s, "exposure_s")).reshape(shape)
 
 
 @dataclass(frozen=True)
@@ -137,13 +135,14 @@ def streaks(
 ) -> Streaks:
     """Streak textures of the drops in a cube of rain (Yoshida, Dobashi and Yamamoto): orthographic, from the side, in still air."""
     diameters, _ = _numbers(diameters_mm, "diameters_mm")
-    opacity, rows = _bansho.streak_textures(float(rate_mm_per_h), diameters, float(exposure_s), float(edge_m), size, seed, variant)
+    side, number = _checks.whole(size, "size", "1 to 65536 pixels", 1, 65536), _checks.whole(variant, "variant", "0 or more", 0, 2**32 - 1)
+    opacity, rows = _bansho.streak_textures(_checks.number(rate_mm_per_h, "rate_mm_per_h"), diameters, _checks.number(exposure_s, "exposure_s"), _checks.number(edge_m, "edge_m"), side, _checks.seed(seed), number)
     drops = []
     for row in rows:
         array = np.zeros(len(row), [("diameter_mm", "f8"), ("speed", "f8"), ("position", "f8", (3,))])
         array["diameter_mm"], array["speed"], array["position"] = row[:, 0], row[:, 1], row[:, 2:]
         drops.append(array)
-    return Streaks(opacity, np.array(diameters), drops, edge_m / size)
+    return Streaks(opacity, np.array(diameters), drops, edge_m / side)
 
 
 @dataclass(frozen=True)
@@ -169,7 +168,7 @@ def aurora_emission(energy_ev: float, flux: float = 1.0, *, spectrum: Spectrum =
     :param flux: their energy flux, mW/m^2.
     :param spectrum: `"gaussian"` (arcs), `"maxwellian"` (diffuse auroras) or `"monoenergetic"`.
     """
-    altitudes, rates, kilorayleigh = _bansho.aurora_emission(float(energy_ev), float(flux), spectrum)
+    altitudes, rates, kilorayleigh = _bansho.aurora_emission(_checks.number(energy_ev, "energy_ev"), _checks.number(flux, "flux"), spectrum)
     names, wavelengths = zip(*_bansho.aurora_lines(), strict=True)
     return AuroraEmission(altitudes, tuple(names), np.array(wavelengths), rates, kilorayleigh)
 

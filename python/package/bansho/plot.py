@@ -1,4 +1,5 @@
-"""The curves of `bansho plot` as arrays: each function returns the columns of its table by name, and `columns` those of any curve of the program."""
+"""Curves as arrays. `columns` returns the table of any curve of `bansho plot` with the program's columns; the other functions return curves of the physics in the
+process, without the program, under names of their own."""
 
 from __future__ import annotations
 

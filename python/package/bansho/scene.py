@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +52,12 @@ class Scene:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
         """Reads a scene file. Paths of files in it count from its folder."""
-        text, name, folder = _bansho.read_scene(Path(path))
+        try:
+            text, name, folder = _bansho.read_scene(Path(path))
+        except OSError as failed:
+            if os.path.exists(path):
+                raise
+            raise FileNotFoundError(*failed.args) from None
         _bansho.check_scene(text, name)
         return cls._of_text(text, name, Path(folder))
 
@@ -72,6 +77,27 @@ class Scene:
     def __setitem__(self, path: str, value: Any) -> None:
         """Sets the value at a dotted path. Without a number or a name it is set in all tables of a list."""
         self._text = _bansho.with_values(self._text, self._name, [(path, value)])
+
+    def __contains__(self, path: object) -> bool:
+        """Whether the text states a value, or has a table, at a dotted path."""
+        value: Any = self.to_dict()
+        for part in str(path).split("."):
+            if isinstance(value, list) and len(value) == 1 and not part.isdecimal():
+                value = value[0]
+            if isinstance(value, list):
+                index = int(part) if part.isdecimal() else len(value)
+                if index >= len(value):
+                    return False
+                value = value[index]
+            elif isinstance(value, dict) and part in value:
+                value = value[part]
+            else:
+                return False
+        return True
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of the tables that the text has."""
+        return iter(self.to_dict())
 
     def __delitem__(self, path: str) -> None:
         """Removes a value, which then has its default, or a table."""

@@ -31,7 +31,7 @@ def as_scene(scene: Scene | str | os.PathLike[str] | Mapping[str, Any]) -> Scene
 
 
 def stored_arrays(scene: Scene, arrays: Mapping[str, Any] | None) -> _bansho.Arrays:
-    """The arrays that stand for files that a scene names: of an image (H, W, 3 or 4), of a depth (H, W), or a list with one for each frame."""
+    """The arrays that stand for files that a scene names: of an image (H, W), or (H, W, 1, 3 or 4), of a depth (H, W), or a list with one for each frame."""
     stored = _bansho.Arrays(scene.folder, int(scene["picture.first_frame"]))
     named = set(scene.asset_paths)
     for name, given in (arrays or {}).items():
@@ -41,13 +41,12 @@ def stored_arrays(scene: Scene, arrays: Mapping[str, Any] | None) -> _bansho.Arr
         if not frames:
             raise ValueError(f"arrays: {name!r} has no frames; allowed: an array, or a list with one for each frame")
         planes = [_arrays.as_numpy(frame, name) for frame in frames]
-        if all(plane.ndim == 2 for plane in planes):
-            for plane in planes:
-                if plane.dtype.kind not in "fui":
-                    raise ValueError(f"{name}: an array of {plane.dtype}; allowed: floats or integers")
-            stored.set_depths(name, [np.ascontiguousarray(plane, dtype=np.float32) for plane in planes])
+        if name == scene["plate.depth"] and name != scene["plate.image"]:
+            # An inverse depth may have no scale: the program fits it to known distances or to the ground.
+            kind, scale = scene["plate.depth_kind"], scene["plate.depth_scale"]
+            stored.set_depths(name, [_arrays.depth_plane(plane, scale is not None or kind == "inverse", name) for plane in planes])
             continue
-        images = [_arrays.image(plane, name) for plane in planes]
+        images = [_arrays.image(_arrays.with_channels(plane), name) for plane in planes]
         if all(image.dtype == np.uint8 for image, _ in images):
             stored.set_codes(name, [image for image, _ in images])
         elif len({is_linear for _, is_linear in images}) == 1 and all(image.dtype == np.float32 for image, _ in images):
@@ -120,7 +119,7 @@ class Shot:
             options[name] = _checks.sides(options.get(name), name)
         options["threads"] = _checks.threads(options.get("threads"))
         if options.get("seed") is not None:
-            options["seed"] = _checks.whole(options["seed"], "seed", "a whole number from 0 to 9e15")
+            options["seed"] = _checks.seed(options["seed"])
         if options.get("loop_s") is not None:
             options["loop_s"] = _checks.number(options["loop_s"], "loop_s", "a number of seconds")
         self.scene = scene.copy()
@@ -170,7 +169,10 @@ class Shot:
         """
         if not self._arrays.is_empty():
             raise ValueError("write: the scene has arrays in place of files; allowed: files, since those who read a scene file need them")
-        numbers = None if frames is None else [frames] if isinstance(frames, int) else [_whole(number) for number in frames]
+        if frames is None:
+            numbers = None
+        else:
+            numbers = [_whole(number) for number in ([frames] if hasattr(frames, "__index__") else frames)]
         begin, stop = self.range
         options = {key: value for key, value in self._options.items() if key not in ("figures", "overscan")}
         first, remarks = _bansho.write_files(
@@ -193,8 +195,17 @@ class Shot:
         return Path(first)
 
     def camera(self, number: int = 0) -> FrameCamera:
-        """The camera at the middle of the exposure of a frame."""
-        return camera_of(self._shot.camera(_whole(number)))
+        """The camera at the middle of the exposure of a frame, for the pixels of `Frame.linear`: of the crop, or of the picture with its overscan."""
+        return camera_of(self._shot.camera(_whole(number)), self._window())
+
+    def _window(self) -> tuple[int, int, int, int]:
+        """The pixels of `Frame.linear` in the picture: x, y, width and height."""
+        crop = self._options.get("crop")
+        if crop is not None:
+            return tuple(crop)  # type: ignore[return-value]
+        width, height = self.size
+        overscan = int(self.scene["picture.overscan"]) if self._options.get("overscan", True) else 0
+        return -overscan, -overscan, width + 2 * overscan, height + 2 * overscan
 
     def time_of(self, number: int) -> float:
         """Time at which a frame begins, s."""
@@ -242,10 +253,7 @@ class Shot:
 
 def _whole(number: Any) -> int:
     """A frame number."""
-    try:
-        return int(number.__index__())
-    except AttributeError:
-        raise ValueError(f"a frame number of type {type(number).__name__}; allowed: int") from None
+    return _checks.whole(number, "a frame number")
 
 
 def _reporter(progress: bool | Progress, count: int) -> Progress:

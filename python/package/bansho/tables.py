@@ -7,6 +7,7 @@ complete and explain them. There is no second list.
 from __future__ import annotations
 
 import difflib
+import inspect
 import keyword
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -137,6 +138,9 @@ def _builder(name: str, table: dict[str, Any]) -> type[SceneTable]:
             parameter["key"]: globals()[inner_class_name(name, parameter)] for parameter in parameters if parameter["table"] is not None
         },
     }
+    # What notebooks complete and show; checks are those of `SceneTable`.
+    keywords = [inspect.Parameter(keyword_name(parameter["key"]), inspect.Parameter.KEYWORD_ONLY, default=None) for parameter in parameters]
+    namespace["__signature__"] = inspect.Signature(keywords)
     return type(name, (SceneTable,), namespace)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,9 @@ from . import _checks, _workers, weather
 __all__ = ["Fog", "Rain"]
 
 Interval = float | tuple[float, float]
+
+MOST_RAIN_MM_PER_H = 300.0
+"""Largest rain rate, mm/h."""
 
 
 def _interval(value: Any, name: str) -> tuple[float, float]:
@@ -23,6 +28,15 @@ def _interval(value: Any, name: str) -> tuple[float, float]:
     if low > high:
         raise ValueError(f"{name}: {value!r}; allowed: {allowed}")
     return low, high
+
+
+def _known(options: dict[str, Any], function: Callable[..., Any], drawn: tuple[str, ...]) -> None:
+    """Refuses options that a function does not have, and those that a transform draws or does not use."""
+    keywords = [name for name, parameter in inspect.signature(function).parameters.items() if parameter.kind is inspect.Parameter.KEYWORD_ONLY]
+    allowed = [name for name in keywords if name not in drawn]
+    for name in options:
+        if name not in allowed:
+            raise TypeError(f"unknown option {name!r}; allowed: {', '.join(allowed)}")
 
 
 class _Transform:
@@ -62,6 +76,11 @@ class _Transform:
         """The image with weather, whose parameters are drawn from the generator."""
         raise NotImplementedError
 
+    @property
+    def available_keys(self) -> Any:
+        """Asked for by `albumentations.Compose`, which takes transforms of its own kind only."""
+        raise TypeError(f"{type(self).__name__} is no transform of albumentations; allowed: {type(self).__name__}(...).as_albumentations()")
+
     def as_albumentations(self) -> Any:
         """This transform as one of albumentations, for `albumentations.Compose`: `compose(image=image, depth=depth)`.
 
@@ -96,13 +115,16 @@ class Rain(_Transform):
 
         `visibility="augment"` is the default here, since physical rain by day is hardly seen; pass `visibility="physical"` for that.
         """
+        _known(options, weather.rain, ("rate_mm_per_h", "wind", "exposure_s", "seed", "truth"))
         # `strength` alone says how strong it is.
         super().__init__(p, seed, {"visibility": visibility if strength is None else None, "strength": strength, **options})
         self.rate_mm_per_h = _interval(rate_mm_per_h, "rate_mm_per_h")
-        if self.rate_mm_per_h[0] <= 0:
-            raise ValueError(f"rate_mm_per_h: {rate_mm_per_h!r}; allowed: rates above 0")
+        if not 0 < self.rate_mm_per_h[0] or not self.rate_mm_per_h[1] <= MOST_RAIN_MM_PER_H:
+            raise ValueError(f"rate_mm_per_h: {rate_mm_per_h!r}; allowed: rates above 0, up to {MOST_RAIN_MM_PER_H:g}")
         self.wind_speed = _interval(wind_speed, "wind_speed")
         self.exposure_s = _interval(exposure_s, "exposure_s")
+        if not self.exposure_s[0] > 0:
+            raise ValueError(f"exposure_s: {exposure_s!r}; allowed: times above 0 s")
 
     def parameters(self, generator: np.random.Generator) -> dict[str, Any]:
         """What `bansho.rain` is called with: drawn from the generator, always in the same order."""
@@ -126,6 +148,7 @@ class Fog(_Transform):
 
     def __init__(self, visibility_m: Interval = (50.0, 1000.0), *, p: float = 1.0, seed: int = 0, **options: Any) -> None:
         """The logarithm of the visibility is drawn evenly. `options` are those of `bansho.fog`."""
+        _known(options, weather.fog, ("truth",))
         super().__init__(p, seed, options)
         self.visibility_m = _interval(visibility_m, "visibility_m")
         if self.visibility_m[0] <= 0:

@@ -370,9 +370,7 @@ def _each(depth: Any, count: int) -> list[Any]:
 
 def _rain_one(pixels: Any, depth: Any, options: dict[str, Any], number: int, truth: bool, threads: int | None, scene: Scene | None = None) -> Any:
     """Rain over one picture; with `truth` a tuple."""
-    checked, is_linear = _arrays.image(pixels)
-    if checked.dtype == np.float32 and not is_linear:
-        raise ValueError("image: an array of uint16; allowed: uint8 (sRGB), or floats (linear sRGB)")
+    checked, is_linear = _arrays.image(pixels, has_uint16=False)
     size = (checked.shape[0], checked.shape[1])
     plane = None if depth is None else _arrays.depth(depth, size, options["depth_kind"], options["depth_scale"])
     if scene is None:
@@ -550,9 +548,7 @@ def fog(
 
     `visibility_m` is the meteorological visibility, at which a black object has 2 % contrast: below 1000 fog, up to 5000 mist. See `bansho.rain` for the others.
     """
-    checked, is_linear = _arrays.image(image)
-    if checked.dtype == np.float32 and not is_linear:
-        raise ValueError("image: an array of uint16; allowed: uint8 (sRGB), or floats (linear sRGB)")
+    checked, is_linear = _arrays.image(image, has_uint16=False)
     if depth is None:
         raise ValueError("depth: None; allowed: an array (height, width), since fog is in front of what has a distance")
     size = (checked.shape[0], checked.shape[1])
