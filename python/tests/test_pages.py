@@ -3,8 +3,10 @@
 import importlib.util
 import inspect
 import re
+import shutil
 import subprocess
 import sys
+import sysconfig
 import warnings
 from pathlib import Path
 
@@ -29,6 +31,12 @@ def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
 
 def test_the_quick_start_needs_no_checkout(program, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # As the page has it, with the plates of the package; without an installed package the program and the plates of the repository.
+    if shutil.which("bansho", path=sysconfig.get_path("scripts")):
+        monkeypatch.delenv("BANSHO_SCENES", raising=False)
+        program = [sys.executable, "-m", "bansho"]
+    else:
+        monkeypatch.setenv("BANSHO_SCENES", str(GUIDE.parents[2] / "scenes"))
     commands = re.findall(r"^python -m bansho (new [^#\n]+)", (GUIDE / "python.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert len(commands) == 2
     for command in commands:
