@@ -4,7 +4,10 @@ use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use bansho_base::{
     color::View,
-    host::assets::{Assets, Picture, PictureAlpha},
+    host::{
+        assets::{Assets, Picture, PictureAlpha},
+        once::LastValue,
+    },
     parameters::{BuildError, Reader},
     phenomenon::{Phenomenon, PhenomenonInfo, Run, Stepped, Stepping, strip::Shutter, surroundings::Occluder},
     tables::{BuildContext, BuiltTable, SharedRole},
@@ -14,7 +17,7 @@ use bansho_base::{
 use crate::{
     crossfade::CrossfadeRun,
     fingerprint::{self, Fingerprint},
-    plate_boxes::{BoxViewsCache, BoxViewsKey, PixelView, PlateBoxes, PlateBoxesCache, PlateBoxesKey},
+    plate_boxes::{BoxViews, BoxViewsKey, PlateBoxes, PlateBoxesKey},
 };
 use bansho_scene::{Instance, PlateSky, Scene, SceneError, SharedInstance};
 
@@ -30,8 +33,10 @@ pub struct CompiledScene {
     built: BTreeMap<Fingerprint, Arc<dyn Phenomenon>>,
     /// The enabled phenomena in the order of the scene, then those that draw its shared tables.
     enabled: Vec<BuiltPhenomenon>,
-    plate_boxes: Arc<PlateBoxesCache>,
-    box_views: Arc<BoxViewsCache>,
+    /// The boxes of the last plate and view.
+    plate_boxes: Arc<LastValue<PlateBoxesKey, PlateBoxes>>,
+    /// Where the last camera saw the boxes: they stay while photographs of one size follow each other.
+    box_views: Arc<LastValue<BoxViewsKey, BoxViews>>,
 }
 
 /// A phenomenon, with the fingerprint of all that it was built from.
@@ -132,16 +137,12 @@ impl CompiledScene {
     }
 
     /// Where the camera sees the boxes of the plate, computed by `compute` if that is not known.
-    pub(crate) fn box_views(
-        &self,
-        key: BoxViewsKey,
-        compute: impl FnOnce() -> Vec<Option<PixelView>>,
-    ) -> Arc<Vec<Option<PixelView>>> {
+    pub(crate) fn box_views(&self, key: BoxViewsKey, compute: impl FnOnce() -> BoxViews) -> Arc<BoxViews> {
         self.box_views.get_or_compute(key, compute)
     }
 
     /// Where the boxes of the plate are kept, if frame `number` shows them and no other sky lights the scene.
-    pub(crate) fn plate_boxes_cache(&self, number: i64) -> Option<&PlateBoxesCache> {
+    pub(crate) fn plate_boxes_cache(&self, number: i64) -> Option<&LastValue<PlateBoxesKey, PlateBoxes>> {
         let is_shown = number == self.scene.picture.first_frame && self.scene.tables.sky(0.0).is_none();
         is_shown.then_some(self.plate_boxes.as_ref())
     }

@@ -1,9 +1,6 @@
 //! The light of a plate in boxes: means over all of its pixels, so that neither the place of a lamp nor a pattern of stripes decides what drops refract.
 
-use std::{
-    ops::Range,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-};
+use std::ops::Range;
 
 use bansho_base::{
     camera::Camera,
@@ -287,34 +284,8 @@ pub(crate) struct BoxViewsKey {
     pub(crate) plate: [usize; 2],
 }
 
-/// Views of the boxes of a plate, `None` where the lens shows no direction. They stay while photographs of the same size follow each other.
-type BoxViews = Arc<Vec<Option<PixelView>>>;
-
-/// The last views of boxes.
-#[derive(Debug, Default)]
-pub(crate) struct BoxViewsCache(Mutex<Option<(BoxViewsKey, BoxViews)>>);
-
-impl BoxViewsCache {
-    /// The views of this key, computed by `compute` if they are not known.
-    pub(crate) fn get_or_compute(
-        &self,
-        key: BoxViewsKey,
-        compute: impl FnOnce() -> Vec<Option<PixelView>>,
-    ) -> BoxViews {
-        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, views)) = lock().as_ref().filter(|(known, _)| *known == key) {
-            return views.clone();
-        }
-        // Not while the lock is held: `compute` works in parallel.
-        let views = Arc::new(compute());
-        *lock() = Some((key, views.clone()));
-        views
-    }
-}
-
-/// The boxes of the plate of a scene, which are computed once for each plate and view.
-#[derive(Debug, Default)]
-pub(crate) struct PlateBoxesCache(Mutex<Option<(PlateBoxesKey, Arc<PlateBoxes>)>>);
+/// Views of the boxes of a plate, `None` where the lens shows no direction.
+pub(crate) type BoxViews = Vec<Option<PixelView>>;
 
 /// What the boxes of a plate depend on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -325,36 +296,11 @@ pub(crate) struct PlateBoxesKey {
     pub(crate) view: color::View,
 }
 
-impl PlateBoxesCache {
-    fn lock(&self) -> MutexGuard<'_, Option<(PlateBoxesKey, Arc<PlateBoxes>)>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Whether there are boxes of this key.
-    pub(crate) fn has(&self, key: &PlateBoxesKey) -> bool {
-        self.lock().as_ref().is_some_and(|(cached, _)| cached == key)
-    }
-
-    /// Keeps the boxes of a key.
-    pub(crate) fn insert(&self, key: PlateBoxesKey, boxes: PlateBoxes) {
-        *self.lock() = Some((key, Arc::new(boxes)));
-    }
-
-    /// The boxes of this key, computed by `compute` if they are not known.
-    pub(crate) fn get_or_compute(&self, key: PlateBoxesKey, compute: impl FnOnce() -> PlateBoxes) -> Arc<PlateBoxes> {
-        if let Some((_, boxes)) = self.lock().as_ref().filter(|(known, _)| *known == key) {
-            return boxes.clone();
-        }
-        // Not while the lock is held: `compute` works in parallel.
-        let boxes = Arc::new(compute());
-        *self.lock() = Some((key, boxes.clone()));
-        boxes
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use bansho_base::image::Image;
+    use std::sync::Arc;
+
+    use bansho_base::{host::once::LastValue, image::Image};
 
     use super::*;
 
@@ -435,7 +381,7 @@ mod tests {
             assert_eq!((light[0], each.pixels), ((each.center[0] * 10 + each.center[1]) as f32 / 100.0, 1));
         }
         let key = PlateBoxesKey { digest: [1; 32], alpha: PictureAlpha::Opaque, view: color::View::DISPLAY };
-        let cache = PlateBoxesCache::default();
+        let cache = LastValue::default();
         let first = cache.get_or_compute(key, || found.clone());
         assert!(Arc::ptr_eq(&first, &cache.get_or_compute(key, || unreachable!("it is known"))));
         let other = cache.get_or_compute(PlateBoxesKey { digest: [2; 32], ..key }, || found);

@@ -77,8 +77,8 @@ class DropSizes:
 def drop_sizes(rate_mm_per_h: float, diameter_mm: ArrayLike | None = None) -> DropSizes:
     """Number density of drops by diameter (by default 0 to 6 mm) at a rain rate."""
     diameters, _ = _numbers(np.linspace(0, 6, 121) if diameter_mm is None else diameter_mm, "diameter_mm")
-    density = _bansho.drop_density(_checks.number(rate_mm_per_h, "rate_mm_per_h"), diameters)
-    return DropSizes(_checks.number(rate_mm_per_h, "rate_mm_per_h"), np.array(diameters), density, _bansho.rain_extinction(_checks.number(rate_mm_per_h, "rate_mm_per_h")))
+    rate = _checks.number(rate_mm_per_h, "rate_mm_per_h")
+    return DropSizes(rate, np.array(diameters), _bansho.drop_density(rate, diameters), _bansho.rain_extinction(rate))
 
 
 def rain_extinction(rate_mm_per_h: float) -> float:
@@ -136,13 +136,14 @@ def streaks(
     """Streak textures of the drops in a cube of rain (Yoshida, Dobashi and Yamamoto): orthographic, from the side, in still air."""
     diameters, _ = _numbers(diameters_mm, "diameters_mm")
     side, number = _checks.whole(size, "size", "1 to 65536 pixels", 1, 65536), _checks.whole(variant, "variant", "0 or more", 0, 2**32 - 1)
-    opacity, rows = _bansho.streak_textures(_checks.number(rate_mm_per_h, "rate_mm_per_h"), diameters, _checks.number(exposure_s, "exposure_s"), _checks.number(edge_m, "edge_m"), side, _checks.seed(seed), number)
+    rate, exposure, edge = (_checks.number(value, name) for value, name in ((rate_mm_per_h, "rate_mm_per_h"), (exposure_s, "exposure_s"), (edge_m, "edge_m")))
+    opacity, rows = _bansho.streak_textures(rate, diameters, exposure, edge, side, _checks.seed(seed), number)
     drops = []
     for row in rows:
         array = np.zeros(len(row), [("diameter_mm", "f8"), ("speed", "f8"), ("position", "f8", (3,))])
         array["diameter_mm"], array["speed"], array["position"] = row[:, 0], row[:, 1], row[:, 2:]
         drops.append(array)
-    return Streaks(opacity, np.array(diameters), drops, edge_m / side)
+    return Streaks(opacity, np.array(diameters), drops, edge / side)
 
 
 @dataclass(frozen=True)

@@ -143,8 +143,8 @@ def _cell(text: str) -> str:
 
 def main() -> None:
     """Writes the page to the path of the first argument."""
-    if len(sys.argv) != 2:
-        raise SystemExit("usage: python -m bansho.reference PATH")
+    if len(sys.argv) != 2 or not sys.argv[1].endswith(".md"):
+        raise SystemExit("usage: python -m bansho.reference PATH.md")
     Path(sys.argv[1]).write_text(page(), encoding="utf-8")
 
 

@@ -76,6 +76,8 @@ def stub() -> str:
 
 def main() -> None:
     """Writes the stub to the path of the first argument, or beside this file."""
+    if len(sys.argv) > 2 or sys.argv[1:] and not sys.argv[1].endswith(".pyi"):
+        raise SystemExit("usage: python -m bansho.stubs [PATH.pyi]")
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("tables.pyi")
     path.write_text(stub(), encoding="utf-8")
 

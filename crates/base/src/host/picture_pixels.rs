@@ -1,4 +1,4 @@
-//! The pixels of a picture, as floats or as the codes of its file.
+//! The pixels of a picture, as floats or as codes of 8 bits.
 
 use crate::{color::VALUES_OF_CODES, image::Image};
 
@@ -96,18 +96,6 @@ impl PicturePixels {
     pub fn iter(&self) -> impl Iterator<Item = [f32; 4]> {
         (0..self.count()).map(|index| self.at(index % self.width(), index / self.width()))
     }
-
-    /// All pixels as floats; codes are divided by 255.
-    #[must_use]
-    pub fn into_floats(self) -> Image<4> {
-        match self {
-            Self::Floats(image) => image,
-            Self::Codes(CodeImage { width, height, pixels }) => {
-                let floats = pixels.into_iter().map(values_of_codes).collect();
-                Image::from_pixels(width, height, floats).unwrap_or(Image::filled(0, 0, [0.0; 4]))
-            }
-        }
-    }
 }
 
 impl PixelRow<'_> {
@@ -163,7 +151,6 @@ mod tests {
             row
         });
         assert_eq!(rows[0], rows[1]);
-        assert_eq!(PicturePixels::Floats(codes.into_floats()), floats);
         assert_eq!(CodeImage::from_pixels(2, 2, vec![[0; 4]; 3]), None);
     }
 }

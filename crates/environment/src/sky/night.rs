@@ -1,11 +1,11 @@
 //! Radiance of the night sky by direction, without its stars.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use bansho_base::{
     camera::directions::Directions,
     color,
-    host::parallel::prelude::*,
+    host::{once::LastValue, parallel::prelude::*},
     math::{
         self, DVec3,
         simd::{FourLanes, LANES, Real},
@@ -138,24 +138,19 @@ impl NightSky {
 
 /// The table of a town's glow. That of the town before is kept: it takes tens of milliseconds, and all views and frames of a scene have the same.
 fn town_luminances(glow: &TownGlow) -> Arc<TownLuminances> {
-    static LAST: Mutex<Option<(TownGlow, Arc<TownLuminances>)>> = Mutex::new(None);
-    let lock = || LAST.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, luminances)) = lock().as_ref().filter(|(known, _)| known == glow) {
-        return luminances.clone();
-    }
-    // Not while the lock is held: this works in parallel.
-    let mut luminances = vec![[0.0; TOWN_STEPS[1] + 1]; TOWN_STEPS[0] + 1];
-    luminances.par_iter_mut().enumerate().for_each(|(row, luminances)| {
-        let root = row as f64 / TOWN_STEPS[0] as f64;
-        let elevation = math::asin(root * root);
-        for (column, luminance) in luminances.iter_mut().enumerate() {
-            let half_sine = column as f64 / TOWN_STEPS[1] as f64;
-            *luminance = glow.luminance(elevation, 1.0 - 2.0 * half_sine * half_sine) as f32;
-        }
-    });
-    let luminances = Arc::new(luminances);
-    *lock() = Some((*glow, luminances.clone()));
-    luminances
+    static LAST: LastValue<TownGlow, TownLuminances> = LastValue::new();
+    LAST.get_or_compute(*glow, || {
+        let mut luminances = vec![[0.0; TOWN_STEPS[1] + 1]; TOWN_STEPS[0] + 1];
+        luminances.par_iter_mut().enumerate().for_each(|(row, luminances)| {
+            let root = row as f64 / TOWN_STEPS[0] as f64;
+            let elevation = math::asin(root * root);
+            for (column, luminance) in luminances.iter_mut().enumerate() {
+                let half_sine = column as f64 / TOWN_STEPS[1] as f64;
+                *luminance = glow.luminance(elevation, 1.0 - 2.0 * half_sine * half_sine) as f32;
+            }
+        });
+        luminances
+    })
 }
 
 impl TownTable {

@@ -61,7 +61,7 @@ pub(crate) fn load(
     let mut color = if mapping.is_identity() {
         let memory = image_in(recycled.color, mapping.plate, [0.0; 4]);
         let boxes = digest.map(|digest| PlateBoxesKey { digest, alpha, view }).zip(compiled.plate_boxes_cache(number));
-        match boxes.filter(|(key, cache)| plate_boxes::is_drawn_light(&image, alpha) && !cache.has(key)) {
+        match boxes.filter(|(key, cache)| plate_boxes::is_drawn_light(&image, alpha) && cache.get(key).is_none()) {
             Some((key, cache)) => {
                 let (color, boxes) = decode_with_boxes(&view, &image, alpha, memory);
                 cache.insert(key, boxes);

@@ -136,6 +136,7 @@ impl LaneCounts {
         high: [f32::NEG_INFINITY; LANES],
     };
 
+    /// Counts all values.
     #[inline(always)]
     fn add_all(&mut self, values: &[f32]) {
         let (batches, rest) = values.as_chunks::<LANES>();

@@ -325,32 +325,22 @@ mod tests {
 
     #[test]
     fn the_rules_of_the_thesis_give_a_violet_border_and_red_tops_at_the_heights_of_the_page() {
-        // The first altitude, km, from 120 km on, at which a color is so.
-        let first = |radius_pm, is_so: &dyn Fn([f64; 3]) -> bool| {
-            (1200..6000)
-                .map(|step| f64::from(step) / 10.0)
-                .find(|altitude| is_so(color_by_the_rules(*altitude, radius_pm)))
-        };
-        for (radius_pm, green_is_positive, green_exceeds_red, green_exceeds_blue, red_exceeds_green) in
-            [(100.0, 136.0, 144.0, 157.0, 330.0), (30.0, 120.0, 120.0, 130.0, 220.0)]
-        {
-            let greener = first(radius_pm, &|[r, g, _]| g > r).unwrap();
-            let found = [
-                first(radius_pm, &|[_, g, _]| g > 0.0).unwrap(),
-                greener,
-                first(radius_pm, &|[_, g, b]| g > b).unwrap(),
-                (0..2500)
-                    .map(|step| greener + f64::from(step) / 10.0)
-                    .find(|altitude| {
-                        let [r, g, _] = color_by_the_rules(*altitude, radius_pm);
-                        r > g
-                    })
-                    .unwrap(),
-            ];
-            let expected = [green_is_positive, green_exceeds_red, green_exceeds_blue, red_exceeds_green];
-            for (found, expected) in found.into_iter().zip(expected) {
-                assert!((found - expected).abs() < 0.02 * expected, "{radius_pm} pm: {found} km, expected {expected}");
-            }
+        // Radius, altitude (km), and two components of which the first exceeds the second from there on; the last component is 0.
+        for (radius_pm, altitude_km, component, other) in [
+            (100.0, 136.0, 1, 3),
+            (100.0, 144.0, 1, 0),
+            (100.0, 157.0, 1, 2),
+            (100.0, 330.0, 0, 1),
+            (30.0, 130.0, 1, 2),
+            (30.0, 220.0, 0, 1),
+        ] {
+            let difference = |altitude_km: f64| {
+                let [r, g, b] = color_by_the_rules(altitude_km, radius_pm);
+                let components = [r, g, b, 0.0];
+                components[component] - components[other]
+            };
+            let [below, above] = [0.98, 1.02].map(|factor| difference(factor * altitude_km));
+            assert!(below < 0.0 && above > 0.0, "{radius_pm} pm at {altitude_km} km: {below} and {above}");
         }
     }
 
