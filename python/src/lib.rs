@@ -8,6 +8,7 @@
 //! | [`tables`] | descriptors of all tables, for the keyword builders |
 //! | [`assets`] | pictures and depths that are arrays |
 //! | [`shot`], [`frame`] | frames as arrays, particles, lights |
+//! | [`frame_stream`] | frames that are drawn ahead, several at a time |
 //! | [`plate_shot`] | weather over single pictures |
 //! | [`effect`] | what follows a program's time |
 //! | [`job`] | files |
@@ -22,6 +23,7 @@ mod curves;
 mod effect;
 mod error;
 mod frame;
+mod frame_stream;
 mod job;
 mod plate_shot;
 mod scene;
@@ -52,6 +54,7 @@ mod _bansho {
         },
         effect::Effect,
         frame::linear_srgb_of_acescg,
+        frame_stream::{FrameStream, stream_for_test},
         job::write_files,
         panic_for_test,
         plate_shot::PlateShot,

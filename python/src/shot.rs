@@ -4,16 +4,26 @@ use std::sync::Arc;
 
 use bansho::{
     BitDepth, CompiledScene, DisplayOptions, GlareUse, Plan, PlanOptions, Rect, RenderError, SceneLinear, SceneOptions,
-    View, ViewName, base::phenomenon::surroundings::Emitter,
+    View, ViewName,
+    base::phenomenon::surroundings::Emitter,
+    job::{FramesInFlight, OptionError},
 };
 use pyo3::{prelude::*, types::PyDict};
 
-use crate::{assets::Arrays, error, frame, scene, work};
+use crate::{
+    assets::Arrays,
+    error, frame,
+    frame_stream::{FrameNumbers, FrameStream},
+    scene, work,
+};
 
 /// A shot: `bansho.Shot` is the class that users see.
 #[pyclass(module = "bansho._bansho", frozen)]
 pub(crate) struct Shot {
     shot: work::PoolMutex<bansho::Shot>,
+    compiled: Arc<CompiledScene>,
+    /// The tasks of all streams of frames, which share the caches of the compiled scene with `shot`.
+    stream_tasks: Arc<work::TaskCount>,
     /// The plan of light, as for EXR files.
     light: Arc<Plan>,
     /// The plan of display codes, as for PNG files.
@@ -33,6 +43,7 @@ impl Shot {
         plan: &Arc<Plan>,
         draw: impl FnOnce(&mut bansho::Shot, &work::Interruption) -> Result<R, RenderError> + Send,
     ) -> PyResult<R> {
+        self.stream_tasks.check_process()?;
         let done = self.shot.run(py, self.threads, |shot, interruption| {
             if !Arc::ptr_eq(shot.plan(), plan) {
                 shot.replace_plan(plan.clone());
@@ -99,8 +110,36 @@ impl Shot {
             let info = phenomenon.info();
             aovs.extend(info.aovs.iter().map(|aov| (format!("{}.{}", info.name, aov.name), aov.unit, aov.doc)));
         }
-        let shot = work::PoolMutex::new(bansho::Shot::open(compiled, light.clone()));
-        Ok(Self { shot, light, finished, is_stepped, aovs, threads })
+        let shot = work::PoolMutex::new(bansho::Shot::open(compiled.clone(), light.clone()));
+        let stream_tasks = Arc::new(work::TaskCount::new());
+        Ok(Self { shot, compiled, stream_tasks, light, finished, is_stepped, aovs, threads })
+    }
+
+    /// How many of `frames` frames of light are drawn at once: as many as `stated`, by default as many as the program draws. One where frames follow from
+    /// each other.
+    fn frames_in_flight(&self, py: Python<'_>, frames: usize, stated: Option<usize>) -> PyResult<usize> {
+        self.stream_tasks.check_process()?;
+        let stated = stated.map_or(FramesInFlight::Auto, FramesInFlight::Count);
+        let at_once = work::run(py, self.threads, |_| stated.for_light(&self.compiled, &self.light, frames))?;
+        at_once.map_err(|refused| match refused {
+            OptionError::FramesInFlight { count, required_gib, max } => error::value(format!(
+                "frames_in_flight: {count} frames would take {required_gib:.1} GiB; allowed: None, or 1 to {max}"
+            )),
+            other => error::value(other.to_string()),
+        })
+    }
+
+    /// The light of `count` frames from `first` on, every `step`-th, of which `in_flight` are drawn at once: of a scene whose frames do not follow from each
+    /// other.
+    fn frame_stream(&self, first: i64, step: i64, count: usize, in_flight: usize) -> PyResult<FrameStream> {
+        self.stream_tasks.check_process()?;
+        // Shots of their own, so that other frames may be drawn meanwhile. Only they share their scratch memory.
+        let original = bansho::Shot::open(self.compiled.clone(), self.light.clone());
+        let mut shots: Vec<_> = std::iter::from_fn(|| original.independent()).take(in_flight).collect();
+        if shots.is_empty() {
+            shots.push(original);
+        }
+        FrameStream::new(shots, FrameNumbers { first, step, count }, self.threads, self.stream_tasks.clone())
     }
 
     /// Draws frame `number` as light.

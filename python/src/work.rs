@@ -6,7 +6,7 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError, TryLockError,
-        atomic::{AtomicBool, AtomicU32, Ordering},
+        atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering},
         mpsc::{self, RecvTimeoutError},
     },
     time::Duration,
@@ -19,7 +19,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::error;
 
 /// Time between two looks at the signals of the process.
-const POLL: Duration = Duration::from_millis(25);
+pub(crate) const POLL: Duration = Duration::from_millis(25);
 /// Time between two attempts to take what another thread uses.
 const RETRY: Duration = Duration::from_millis(1);
 
@@ -33,6 +33,13 @@ static POOLS: Mutex<BTreeMap<(u32, usize), Arc<ThreadPool>>> = Mutex::new(BTreeM
 #[derive(Clone, Default)]
 pub(crate) struct Interruption {
     is_requested: Arc<AtomicBool>,
+}
+
+impl Interruption {
+    /// Asks the work to stop.
+    pub(crate) fn request(&self) {
+        self.is_requested.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Observer for Interruption {
@@ -56,7 +63,7 @@ pub(crate) fn thread_count(threads: Option<i64>) -> PyResult<usize> {
 }
 
 /// The pool of this process with that many threads.
-fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
+pub(crate) fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
     let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
     let key = (std::process::id(), threads);
     if let Some(pool) = pools.get(&key) {
@@ -137,7 +144,7 @@ fn in_pool<R: Send>(
                 Err(RecvTimeoutError::Timeout) => {
                     let handled = Python::attach(|py| py.check_signals().and_then(|()| poll(py)));
                     if let Err(exception) = handled {
-                        interruption.is_requested.store(true, Ordering::Relaxed);
+                        interruption.request();
                         raised = Some(exception);
                     }
                 }
@@ -145,7 +152,7 @@ fn in_pool<R: Send>(
         }
     });
     match (outcome, raised) {
-        (Some(Err(payload)), _) => Err(Failure::Panicked(error::internal(message_of(payload.as_ref())))),
+        (Some(Err(payload)), _) => Err(Failure::Panicked(panicked(payload.as_ref()))),
         (_, Some(exception)) => Err(Failure::Raised(exception)),
         (Some(Ok(done)), None) => Ok(done),
         (None, None) => Err(Failure::Panicked(error::internal("a thread ended before its work was done".to_owned()))),
@@ -229,8 +236,52 @@ impl<T: Send> PoolMutex<T> {
     }
 }
 
+/// Counts the tasks of pools that use an object. The threads of pools do not survive a fork, and locks that their tasks held remain locked in the child
+/// process.
+pub(crate) struct TaskCount {
+    running: AtomicUsize,
+    /// The process that used the object last.
+    process: AtomicU32,
+}
+
+impl TaskCount {
+    pub(crate) fn new() -> Self {
+        Self { running: AtomicUsize::new(0), process: AtomicU32::new(std::process::id()) }
+    }
+
+    /// Counts a task until the guard is dropped.
+    pub(crate) fn count(&self) -> TaskGuard<'_> {
+        self.running.fetch_add(1, Ordering::SeqCst);
+        TaskGuard(self)
+    }
+
+    /// Checks that the object may be used in this process.
+    ///
+    /// # Errors
+    /// `RuntimeError` in a child process, if a task of its parent used the object during the fork.
+    pub(crate) fn check_process(&self) -> PyResult<()> {
+        let own = std::process::id();
+        if self.process.load(Ordering::Relaxed) != own {
+            if self.running.load(Ordering::SeqCst) > 0 {
+                return Err(forked());
+            }
+            self.process.store(own, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+}
+
+/// A task that is counted by a [`TaskCount`].
+pub(crate) struct TaskGuard<'a>(&'a TaskCount);
+
+impl Drop for TaskGuard<'_> {
+    fn drop(&mut self) {
+        self.0.running.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
 /// A thread of the parent process was using it.
-fn forked() -> PyErr {
+pub(crate) fn forked() -> PyErr {
     PyRuntimeError::new_err(
         "another thread was using this object when this process was forked; allowed: an object that is opened in this process",
     )
@@ -239,6 +290,11 @@ fn forked() -> PyErr {
 /// An earlier call panicked.
 fn broken() -> PyErr {
     error::internal("an earlier call on this object failed within Bansho; open it again".to_owned())
+}
+
+/// The exception for a panic.
+pub(crate) fn panicked(payload: &(dyn Any + Send)) -> PyErr {
+    error::internal(message_of(payload))
 }
 
 /// What a panic says.

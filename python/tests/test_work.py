@@ -84,11 +84,13 @@ def interrupted_after(seconds, work):
 def test_an_interrupt_stops_the_work_within_100_ms():
     scene = bansho.Scene.parse(LONG)
     shot, effect = bansho.open(scene), bansho.Effect(scene)
+    several = bansho.open(bansho.Scene([bansho.Picture(size=(960, 540), frames=10_000), bansho.FlameSheet(), bansho.Rain()]))
     image = np.full((2160, 3840, 3), 90, np.uint8)
     calls = {
         "render": lambda: shot.render(199),
         "at": lambda: effect.at(6.0),
         "rain": lambda: [bansho.rain(image, rate_mm_per_h=80, strength=10.0, seed=seed) for seed in range(100)],
+        "frames": lambda: list(several.frames(frames_in_flight=3)),
         # The start of a loop is searched for.
         "open": lambda: [bansho.open(bansho.Scene([bansho.FlameSheet(), bansho.Rain(rate_mm_per_h=100)]), loop_s=8.0, seed=seed) for seed in range(400)],
     }
@@ -219,6 +221,33 @@ def test_a_process_that_is_forked_while_a_thread_draws_is_told_so():
             stop.clear()
         allowed = "another thread was using this object when this process was forked; allowed: an object that is opened in this process"
         assert answers <= {allowed, "done"} and allowed in answers, (number, answers)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_process_that_is_forked_while_frames_are_drawn_ahead_is_told_so():
+    shot = bansho.open(bansho.Scene([bansho.Picture(size=(640, 360), frames=100), bansho.FlameSheet(), bansho.Rain()]), threads=2)
+    frames = shot.frames(frames_in_flight=4)
+    assert next(frames).number == 0
+
+    def answer(call):
+        try:
+            call()
+        except RuntimeError as told:
+            return str(told)
+        return "done"
+
+    others = (lambda: shot.render(1), lambda: list(shot.frames(0, 4, frames_in_flight=2)))
+    forked = "another thread was using this object when this process was forked; allowed: an object that is opened in this process"
+    # Frames are being drawn right after one was taken.
+    assert in_forked_process(lambda: [answer(call) for call in (*others, lambda: next(frames))]) == [forked] * 3
+    assert in_forked_process(lambda: answer(frames.close)) == "done"
+    assert next(frames).number == 1
+    frames.close()
+    # Once the tasks have ended nobody uses the shot.
+    deadline = time.perf_counter() + 30
+    while in_forked_process(lambda: [answer(call) for call in others]) != ["done"] * 2:
+        assert time.perf_counter() < deadline
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")

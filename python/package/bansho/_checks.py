@@ -76,6 +76,11 @@ def threads(given: Any) -> int | None:
     return None if given is None else whole(given, "threads", "1 to 1024, or None for one for each core")
 
 
+def frames_in_flight(given: Any) -> int | None:
+    """How many frames are drawn at once, or `None` for a number that suits."""
+    return None if given is None else whole(given, "frames_in_flight", "None, or a number of frames of at least 1", 1)
+
+
 def shortened(value: Any) -> str:
     """What a message shows of a value that may be long."""
     text = repr(value)

@@ -138,17 +138,41 @@ class Shot:
         codes = self._shot.draw_display(_whole(number), bits, alpha)
         return np.ascontiguousarray(codes[..., :3]) if alpha is None else codes
 
-    def frames(self, first: int | None = None, end: int | None = None, *, step: int = 1, progress: bool | Progress = False) -> Iterator[Frame]:
+    def frames(
+        self,
+        first: int | None = None,
+        end: int | None = None,
+        *,
+        step: int = 1,
+        progress: bool | Progress = False,
+        frames_in_flight: int | None = None,
+    ) -> Iterator[Frame]:
         """Draws the frames from `first` up to, but without, `end`: by default all of the shot.
 
-        `progress` is called with the number of frames that are done and of all; `True` shows a bar of tqdm, if that is installed.
+        `progress` is called with the number of frames that are done and of all; `True` shows a bar of tqdm, if that is installed. `frames_in_flight` is how many
+        frames are drawn at once and kept until they are taken; `None` for one with fewer than 8 threads or over a plate, else up to one for each thread. The
+        bytes are the same for any number. Simulations are always drawn one frame after the other.
         """
         begin, stop = self.range
         numbers = range(begin if first is None else _whole(first), stop if end is None else _whole(end), step)
+        return self._drawn(numbers, progress, self._shot.frames_in_flight(len(numbers), _checks.frames_in_flight(frames_in_flight)))
+
+    def _drawn(self, numbers: range, progress: bool | Progress, in_flight: int) -> Iterator[Frame]:
+        """Draws frames, of which `in_flight` at once."""
         report = _reporter(progress, len(numbers))
-        for done, number in enumerate(numbers, start=1):
-            yield self.render(number)
-            report(done, len(numbers))
+        if in_flight == 1:
+            for done, number in enumerate(numbers, start=1):
+                yield self.render(number)
+                report(done, len(numbers))
+            return
+        stream = self._shot.frame_stream(numbers.start, numbers.step, len(numbers), in_flight)
+        try:
+            for done, drawn in enumerate(stream, start=1):
+                yield Frame(self, drawn, self._space)
+                report(done, len(numbers))
+        finally:
+            # Frames that are drawn ahead are of no use if the iteration ends early.
+            stream.close()
 
     def write(
         self,

@@ -95,6 +95,36 @@ pub(crate) fn frames_drawn_at_once(compiled: &CompiledScene, plan: &Plan, reques
     count.min(request.frames).max(1)
 }
 
+/// How many frames fewer than `count` there is memory for at once; `None` if there is none for one.
+fn max_in_flight(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, count: usize) -> Option<usize> {
+    let fits = |count: &usize| {
+        let request = MemoryRequest { in_flight: FramesInFlight::Count(*count), ..request };
+        memory::can_allocate(largest_bytes(compiled, plan, request))
+    };
+    (1..count).take_while(fits).last()
+}
+
+impl FramesInFlight {
+    /// How many of `frames` frames of light a program draws at once, each from a [`Shot`](bansho_render::Shot) of its own
+    /// ([`independent`](bansho_render::Shot::independent)): as many as a [`Job`](crate::job::Job) that writes them to EXR files in the same pool. One where
+    /// they follow from each other, as in simulations.
+    ///
+    /// # Errors
+    /// [`OptionError::FramesInFlight`]: more frames are stated than there is memory for. One is always allowed.
+    pub fn for_light(self, compiled: &CompiledScene, plan: &Plan, frames: usize) -> Result<usize, OptionError> {
+        let request = MemoryRequest { frames, tiles: 0, display: None, size_is_option: true, in_flight: self };
+        let at_once = frames_drawn_at_once(compiled, plan, request);
+        let bytes = largest_bytes(compiled, plan, request);
+        match self {
+            Self::Count(count) if at_once > 1 && !memory::can_allocate(bytes) => {
+                let max = max_in_flight(compiled, plan, request, count).unwrap_or(1);
+                Err(OptionError::FramesInFlight { count, required_gib: bytes / GIB, max })
+            }
+            _ => Ok(at_once),
+        }
+    }
+}
+
 /// How many of the frames that may be drawn at once take memory: a thread that waits for parts of its frame takes on another one, and seldom more.
 fn frames_in_memory(drawn_at_once: usize) -> usize {
     drawn_at_once.min(2 * rayon::current_num_threads() - 1)
@@ -320,14 +350,10 @@ pub(crate) fn check(
         return Ok(());
     }
     check_without_pixels(scene, compiled, plan)?;
-    if let FramesInFlight::Count(count @ 2..) = request.in_flight {
-        let fits = |count: usize| {
-            let request = MemoryRequest { in_flight: FramesInFlight::Count(count), ..request };
-            memory::can_allocate(largest_bytes(compiled, plan, request))
-        };
-        if let Some(max) = (1..count).take_while(|count| fits(*count)).last() {
-            return Err(OptionError::FramesInFlight { count, required_gib: bytes / GIB, max }.into());
-        }
+    if let FramesInFlight::Count(count @ 2..) = request.in_flight
+        && let Some(max) = max_in_flight(compiled, plan, request, count)
+    {
+        return Err(OptionError::FramesInFlight { count, required_gib: bytes / GIB, max }.into());
     }
     // The overscan is the problem only if the picture without it would fit.
     let without_overscan = pixel_count(plan.size(), 0);
@@ -470,6 +496,28 @@ mod tests {
         // Each of two threads draws a frame and, while it waits, one of them another.
         let [three, nine] = pool(2).install(|| [3, 9].map(estimate));
         assert!((three - nine).abs() < 1.0, "{three} {nine}");
+    }
+
+    #[test]
+    fn frames_of_light_in_flight_are_as_many_as_of_a_job_and_refused_where_they_do_not_fit() {
+        let of_size = |size: &str, frames: usize, in_flight: FramesInFlight| {
+            let text = format!("bansho = 2\n[picture]\nsize = {size}\nframes = 9999\n");
+            let compiled = crate::compile_scene("test", &text, Arc::new(MemoryAssets::default())).unwrap();
+            let plan = Plan::new(&compiled, &PlanOptions::default()).unwrap();
+            in_flight.for_light(&compiled, &plan, frames)
+        };
+        let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let small =
+            |threads, frames, in_flight| pool(threads).install(|| of_size("[64, 36]", frames, in_flight)).unwrap();
+        assert_eq!(small(7, 9999, FramesInFlight::Auto), 1);
+        assert_eq!(small(8, 9999, FramesInFlight::Auto), 8);
+        assert_eq!(small(8, 32, FramesInFlight::Auto), 2);
+        assert_eq!(small(2, 9999, FramesInFlight::Count(5)), 5);
+        assert_eq!(small(2, 3, FramesInFlight::Count(5)), 3);
+        // No address space holds as many frames.
+        let refused = of_size("[16384, 16384]", usize::MAX, FramesInFlight::Count(1 << 40));
+        let Err(OptionError::FramesInFlight { count, max, .. }) = refused else { panic!("{refused:?}") };
+        assert!(count == 1 << 40 && (1..10_000).contains(&max), "{max}");
     }
 
     #[test]
