@@ -285,7 +285,7 @@ fn spawn_finish<'scope, K: FrameSink>(
 }
 
 /// Advances to frame `number` after frame `last`. Where it is not the next one, `snapshots` shorten the way to it.
-fn advance(
+pub(crate) fn advance(
     shot: &mut dyn FrameSource,
     last: Option<i64>,
     number: i64,
