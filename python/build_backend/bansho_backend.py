@@ -45,12 +45,12 @@ def _add_program() -> None:
 
 
 def _add_plates() -> None:
-    """Puts the plates of scenes without auroras where the program looks for them. With those of auroras a wheel would be larger than 20 MB."""
+    """Puts plates where the program looks for them: with those of auroras, or of the street, a wheel would be larger than 20 MB."""
     shutil.rmtree(SCENES, ignore_errors=True)
     scenes = ROOT.parent / "scenes"
     for scene in sorted([*scenes.glob("*.toml"), *scenes.glob("papers/*/*.toml")]):
         text = scene.read_text(encoding="utf-8")
-        if "[[aurora]]" in text:
+        if "[[aurora]]" in text or "plates/street" in text:
             continue
         for name in re.findall(r'^(?:image|depth|albedo|normal) = "(plates/[^"]+)"', text, re.MULTILINE):
             copy = SCENES / scene.parent.relative_to(scenes) / name

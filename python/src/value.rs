@@ -18,7 +18,7 @@ const MOST_LEVELS: usize = 32;
 /// A Python object as a value of a scene: numbers, strings, lists, dictionaries, and what has a method `tolist` (numpy) or `to_dict` (tables).
 ///
 /// # Errors
-/// `ValueError` for another type, a whole number beyond 64 bits, or an object that contains itself.
+/// `ValueError` for another type, a whole number beyond 64 bits, a number that is not finite, or an object that contains itself.
 pub(crate) fn from_python(object: &Bound<PyAny>) -> PyResult<Value> {
     read(object, 0)
 }
@@ -35,7 +35,12 @@ fn read(object: &Bound<PyAny>, level: usize) -> PyResult<Value> {
         return Ok(Value::Integer(whole));
     }
     if object.is_instance_of::<PyFloat>() {
-        return Ok(Value::Number(object.extract()?));
+        let number: f64 = object.extract()?;
+        return if number.is_finite() {
+            Ok(Value::Number(number))
+        } else {
+            Err(error::value(format!("the number {}; allowed: finite numbers", object.repr()?)))
+        };
     }
     if object.is_instance_of::<PyString>() {
         return Ok(Value::Text(object.extract()?));

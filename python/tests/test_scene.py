@@ -114,3 +114,11 @@ def test_tables_and_values_that_are_stated_are_in_a_scene():
     scene.add(bansho.Camera())
     del scene["rain.1"]
     assert "camera" in scene and "rain.splashes" in scene
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("-inf"), np.float32("nan"), np.float64("inf")])
+def test_a_number_that_is_not_finite_is_refused_and_changes_nothing(number):
+    scene = bansho.Scene.parse(TEXT)
+    with pytest.raises(ValueError, match=r"the number (nan|-?inf|np\.float64\(inf\)); allowed: finite numbers"):
+        scene["rain.shower.rate_mm_per_h"] = number
+    assert scene.to_toml() == TEXT

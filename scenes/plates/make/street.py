@@ -510,4 +510,5 @@ def build(args):
 if __name__ == "__main__":
     arguments = plate.options("street")
     seen = build(arguments)
-    plate.make("street", arguments, 2.4, seen, air=(140.0, (0.020, 0.016, 0.013)), halo=0.10)
+    # Standing water and panes are black too, and would be taken for metals.
+    plate.make("street", arguments, 2.4, seen, air=(140.0, (0.020, 0.016, 0.013)), halo=0.10, metals=False)
