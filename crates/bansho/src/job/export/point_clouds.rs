@@ -164,7 +164,7 @@ impl PreparedSimulation {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "fire"))]
 mod tests {
     use std::{
         collections::BTreeMap,
