@@ -1,20 +1,20 @@
 #!/usr/bin/env python3
 """Fails when two frames in flight on two threads are not as many times faster than one frame after the other on two threads as .ci/in_flight_ratios.txt asks.
 
-Both are measured in turn, by the clock, so that the speed of the machine does not matter, and the least time of each counts: what else runs on the machine
-only adds to a time, and one wait for a core would decide the ratio of a pair of runs. A scene that is not fast enough is measured again, up to three times,
-and all its runs count.
+Both are measured in turn, by the clock, so that the speed of the machine does not matter, and the median of the times of each counts: single runs of a second
+scatter by a tenth, so that the ratio of a pair says little. A scene that is not fast enough is measured again, up to five times, and all its runs count.
 Usage: in_flight.py PROGRAM RATIOS_FILE [SCENE...]
 """
 
 import json
+import statistics
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 RUNS = 5
-ROUNDS = 3
+ROUNDS = 5
 THREADS = 2
 
 
@@ -52,7 +52,7 @@ def holds(program, path, wanted):
                 # Which comes first alternates, since what runs first may find a colder machine.
                 for count in (1, 2) if run % 2 == 0 else (2, 1):
                     times[count].append(seconds(program, scene, size, frames, count, folder))
-                ratio = min(times[1]) / min(times[2])
+                ratio = statistics.median(times[1]) / statistics.median(times[2])
                 if (run + 1) % RUNS == 0 and ratio >= floor:
                     break
         good &= ratio >= floor
