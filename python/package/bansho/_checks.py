@@ -77,7 +77,7 @@ def threads(given: Any) -> int | None:
 
 
 def frames_in_flight(given: Any) -> int | None:
-    """How many frames are drawn at once, or `None` for a number that suits."""
+    """How many frames are drawn at once, or `None` for as many as the program would draw."""
     return None if given is None else whole(given, "frames_in_flight", "None, or a number of frames of at least 1", 1)
 
 

@@ -95,7 +95,7 @@ pub(crate) fn frames_drawn_at_once(compiled: &CompiledScene, plan: &Plan, reques
     count.min(request.frames).max(1)
 }
 
-/// How many frames fewer than `count` there is memory for at once; `None` if there is none for one.
+/// The largest number of frames below `count` that there is memory for at once; `None` if there is not even for one.
 fn max_in_flight(compiled: &CompiledScene, plan: &Plan, request: MemoryRequest, count: usize) -> Option<usize> {
     let fits = |count: &usize| {
         let request = MemoryRequest { in_flight: FramesInFlight::Count(*count), ..request };
