@@ -151,6 +151,18 @@ class Cluster:
         lines = self.run("squeue", "-h", "-t", "RUNNING", "-o", "%i %N").splitlines()
         return [(job, node) for job, node in map(str.split, lines) if "_" in job]
 
+    def wait_for_tasks_on(self, *nodes: str) -> dict[str, str]:
+        """Waits until tasks run on all these nodes; the task of each."""
+        tasks: dict[str, str] = {}
+
+        def run_on_all() -> bool:
+            tasks.clear()
+            tasks.update({node: job for job, node in self.running()})
+            return all(node in tasks for node in nodes)
+
+        self.wait(f"tasks run on {', '.join(nodes)}", run_on_all, 120)
+        return tasks
+
     def queued(self) -> list[str]:
         """Jobs and tasks of arrays that are queued, running or about to end."""
         return self.run("squeue", "-h", "-r", "-o", "%i").split()
