@@ -22,7 +22,7 @@
 //! # Data flow
 //! [`Solids`] holds the obstacles, with a bounding volume hierarchy for each mesh. For a frame, `trace` places them at several times while the shutter is
 //! open (`pose`), and finds for each pixel what it shows: where the corners of a pixel show one smooth surface, one ray, else sixteen. `shade` computes
-//! the radiance. The drawn pixels are copied to the strips. Their depth hides all phenomena behind them. Where a pixel is covered partly, the renderer mixes in
+//! the radiance. While nothing changes, `trace_cache` keeps the pixels from frame to frame. They are copied to the strips. Their depth hides all phenomena behind them. Where a pixel is covered partly, the renderer mixes in
 //! the scene without them ([`OpaqueSurfaces`](bansho_base::phenomenon::OpaqueSurfaces)). Where other things move over the same pixels, the
 //! renderer draws them at many moments of the exposure (`trace::UntracedSolids`).
 
@@ -32,6 +32,7 @@ mod phenomenon;
 mod pose;
 mod shade;
 mod trace;
+mod trace_cache;
 
 #[cfg(test)]
 mod tests;
@@ -39,11 +40,13 @@ mod tests;
 use bansho_base::color::acescg_from_srgb;
 use intersect::TriangleBvh;
 pub use obstacle::{Obstacle, ObstacleMesh, ObstacleParameters, ObstacleShape};
+use trace_cache::TraceCache;
 
 /// The visible obstacles of a scene.
 #[derive(Debug)]
 pub struct Solids {
     solids: Vec<Solid>,
+    cache: TraceCache,
 }
 
 /// A visible obstacle.
@@ -87,6 +90,6 @@ impl Solids {
             let triangles = obstacle.mesh().map(|mesh| TriangleBvh::new(&mesh.mesh));
             solids.push(Solid { triangles, material: Material::new(obstacle.parameters()), obstacle });
         }
-        Self { solids }
+        Self { solids, cache: TraceCache::default() }
     }
 }

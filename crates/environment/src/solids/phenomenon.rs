@@ -9,7 +9,7 @@ use bansho_base::{
     },
     parameters::BuildError,
     phenomenon::{
-        Phenomenon, PhenomenonInfo, Prepared, Run,
+        Phenomenon, PhenomenonInfo, Prepared, Run, SharedMemory,
         strip::{DepthInterval, Shutter, View},
         surroundings::{Publication, Surroundings},
     },
@@ -20,7 +20,8 @@ use bansho_base::{
 use super::{
     Obstacle, ObstacleParameters, ObstacleShape, Solids,
     pose::parts_of_exposure,
-    trace::{PreparedSolids, UntracedSolids, depth_intervals},
+    trace::{PreparedSolids, UntracedSolids, depth_intervals, picture_bounds},
+    trace_cache,
 };
 
 impl Phenomenon for Solids {
@@ -31,6 +32,12 @@ impl Phenomenon for Solids {
     /// Obstacles only reflect the light of others.
     fn luminance(&self) -> f64 {
         0.0
+    }
+
+    /// The pixels that are kept from frame to frame, for all frames that are drawn at once.
+    fn shared_memory(&self, view: &View) -> Vec<SharedMemory> {
+        let bytes = trace_cache::estimated_bytes(view, picture_bounds(self, view));
+        vec![SharedMemory { key: ("pixels of obstacles", 0), bytes }]
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {

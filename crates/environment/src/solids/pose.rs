@@ -100,6 +100,11 @@ impl<'a> Pose<'a> {
         Self { camera: view.camera_at(t), fraction: None, solids, mirror: view.mirror }
     }
 
+    /// Where the obstacles are.
+    pub(super) fn placements(&self) -> impl Iterator<Item = Transform> + '_ {
+        self.solids.iter().map(|placed| placed.placement)
+    }
+
     /// Largest motion of each obstacle in the picture from this pose to another one, pixels.
     fn motion_pixels(&self, other: &Self) -> Vec<f64> {
         let mut motions = Vec::with_capacity(self.solids.len());

@@ -11,7 +11,11 @@ use bansho_base::{
         strip::{DepthInterval, Shutter, Strip, View},
         surroundings::{Emitter, Light, Surroundings},
     },
-    world::wind::{Wind, WindParameters},
+    world::{
+        occluder::Occluder,
+        sky::{Sky, SkyKind},
+        wind::{Wind, WindParameters},
+    },
 };
 
 use super::{Obstacle, ObstacleParameters, ObstacleShape, Solids};
@@ -140,4 +144,56 @@ fn a_mirror_shows_what_is_above_it_only() {
     // The post reaches 2 m below and above the mirror, so the reflection begins where the post meets it, in the middle row.
     let (first, last) = (rows(&seen)[0], rows(&above)[rows(&above).len() - 1]);
     assert!(first.abs_diff(SIZE[1] / 2) <= 1 && last > SIZE[1] / 2 + 4, "{first} {last}");
+}
+
+#[test]
+fn pixels_of_earlier_frames_are_used_only_while_nothing_changes() {
+    let path = vec![(1.0, [0.0; 3]), (2.0, [0.5, 0.0, 0.0])];
+    let all = [
+        ObstacleParameters {
+            position: Animated::keyed(path, Interpolation::Linear).unwrap(),
+            reflectance: 0.04,
+            ..ball([0.0; 3], 1.0)
+        },
+        ball([2.0, 1.0, 1.0], 0.5),
+    ];
+    let known = solids(&all);
+    let wind = Wind::new(WindParameters::default(), 1, None);
+    let emitter = Emitter::Point { position: DVec3::new(0.0, 3.0, 4.0), radius: 0.1 };
+    let mut before = Surroundings::from_wind(&wind);
+    before.others.lights = vec![Light { emitter, intensity: [100.0; 3] }];
+    let radiance = |solids: &Solids, view: &View, surroundings: &Surroundings| {
+        let prepared = solids.prepare(view, surroundings, &Unobserved).unwrap();
+        let mut strip = Strip::default();
+        strip.reset(Rect::from_size(SIZE[0], SIZE[1]), None, 0);
+        prepared.draw(&DepthInterval::ALL, &mut strip);
+        strip.radiance
+    };
+    let first = radiance(&known, &view(0.0), &before);
+    let mut changes = vec![(view(0.0), before.clone())];
+    let mut change_surroundings = |change: fn(&mut Surroundings)| {
+        let mut after = before.clone();
+        change(&mut after);
+        changes.push((view(0.0), after));
+    };
+    change_surroundings(|after| after.others.lights[0].intensity[1] = 90.0);
+    change_surroundings(|after| after.others.lights.clear());
+    change_surroundings(|after| after.others.extinction = 0.05);
+    change_surroundings(|after| {
+        after.others.occluders.push(Occluder::HalfSpace { point: -DVec3::Y, normal: DVec3::Y })
+    });
+    change_surroundings(|after| after.sky = Sky::new(SkyKind::Uniform, 0.5, 6500.0));
+    let mut change_view = |change: fn(&mut View)| {
+        let mut after = view(0.0);
+        change(&mut after);
+        changes.push((after, before.clone()));
+    };
+    change_view(|after| after.shutter = Shutter { open: 2.0, close: 2.0 });
+    change_view(|after| *after = after.mirrored(-0.5));
+    change_view(|after| after.window = Rect { x: 20, y: 10, width: 30, height: 20 });
+    for (index, (view, surroundings)) in changes.iter().enumerate() {
+        let [found, traced] = [&known, &solids(&all)].map(|solids| radiance(solids, view, surroundings));
+        assert_eq!(found, traced, "change {index}");
+        assert_eq!(index == 0, found == first, "change {index} is seen");
+    }
 }

@@ -1,5 +1,7 @@
 //! The pixels of a frame: what each shows of the obstacles, antialiased, with motion blur.
 
+use std::sync::Arc;
+
 use bansho_base::{
     host::{
         observer::{Cancelled, Observer, check},
@@ -43,8 +45,9 @@ impl Pixel {
     const EMPTY: Self = Self { radiance: [0.0; 3], coverage: 0.0, depth: f32::INFINITY, opaque_depth: f32::INFINITY };
 }
 
-/// A frame of the obstacles.
-pub(super) struct PreparedSolids {
+/// What the pixels of a view show of the obstacles.
+#[derive(Debug)]
+pub(super) struct TracedPixels {
     /// The pixels that may show one.
     rect: Rect,
     /// Those that may show one that moves in the picture.
@@ -52,6 +55,9 @@ pub(super) struct PreparedSolids {
     pixels: Vec<Pixel>,
     surfaces: OpaqueSurfaces,
 }
+
+/// A frame of the obstacles.
+pub(super) struct PreparedSolids(Arc<TracedPixels>);
 
 /// Position of ray `index` of `count`, a power of two, within its pixel (Hammersley).
 fn sample_offset(index: usize, count: usize) -> DVec2 {
@@ -98,7 +104,7 @@ fn is_in_any(rects: &[Rect], x: usize, y: usize) -> bool {
 }
 
 impl PreparedSolids {
-    /// Traces the pixels of the view's window.
+    /// The pixels of the view's window: traced, or known from an earlier frame.
     ///
     /// # Errors
     /// The observer asked to stop.
@@ -109,11 +115,40 @@ impl PreparedSolids {
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         let (poses, moves) = poses(solids, view);
-        let rects = bounds(&poses, view);
-        let rect = rects.iter().fold(Rect::default(), |all, rect| all.union(rect));
-        let moving: Vec<Rect> = rects.iter().zip(moves).filter(|(_, moves)| *moves).map(|(rect, _)| *rect).collect();
+        let trace = || TracedPixels::new(&poses, &moves, view, surroundings, observer);
+        let pixels = match poses.as_slice() {
+            [pose] => solids.cache.pixels(pose, view, surroundings, trace)?,
+            _ => Arc::new(trace()?),
+        };
+        Ok(Self(pixels))
+    }
+}
+
+/// The rectangle of the picture that the obstacles may cover while the shutter is open.
+pub(super) fn picture_bounds(solids: &Solids, view: &View) -> Rect {
+    let (poses, _) = poses(solids, view);
+    hull(&bounds(&poses, view))
+}
+
+/// The smallest rectangle that contains others.
+fn hull(rects: &[Rect]) -> Rect {
+    rects.iter().fold(Rect::default(), |all, rect| all.union(rect))
+}
+
+impl TracedPixels {
+    /// Traces the pixels of the view's window.
+    fn new(
+        poses: &[Pose],
+        moves: &[bool],
+        view: &View,
+        surroundings: &Surroundings,
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
+        let rects = bounds(poses, view);
+        let rect = hull(&rects);
+        let moving: Vec<Rect> = rects.iter().zip(moves).filter(|(_, moves)| **moves).map(|(rect, _)| *rect).collect();
         let shading = Shading::new(surroundings);
-        let tracer = Tracer { poses: &poses, shading: &shading, rects: &rects, moving: &moving };
+        let tracer = Tracer { poses, shading: &shading, rects: &rects, moving: &moving };
         let corners = tracer.corners(rect, observer)?;
         let mut pixels = vec![Pixel::EMPTY; rect.width * rect.height];
         pixels.par_chunks_mut(rect.width.max(1)).enumerate().try_for_each(|(y, row)| {
@@ -125,8 +160,7 @@ impl PreparedSolids {
             }
             Ok(())
         })?;
-        let moving_rect = moving.iter().fold(Rect::default(), |all, rect| all.union(rect));
-        Ok(Self { rect, moving_rect, surfaces: opaque_surfaces(rect, &pixels), pixels })
+        Ok(Self { rect, moving_rect: hull(&moving), surfaces: opaque_surfaces(rect, &pixels), pixels })
     }
 }
 
@@ -157,7 +191,7 @@ impl<'a> UntracedSolids<'a> {
     pub(super) fn new(solids: &'a Solids, view: &View, surroundings: &'a Surroundings<'a>) -> Self {
         let pose = Pose::new(solids, view, view.shutter.middle());
         let rects = bounds(std::slice::from_ref(&pose), view);
-        let rect = rects.iter().fold(Rect::default(), |all, rect| all.union(rect));
+        let rect = hull(&rects);
         Self { pose, shading: Shading::new(surroundings), rects, rect }
     }
 
@@ -180,7 +214,8 @@ impl<'a> UntracedSolids<'a> {
                 pixels.push(tracer.pixel([rect.x + x, y], [upper[x], upper[x + 1], lower[x], lower[x + 1]]));
             }
         }
-        PreparedSolids { rect, moving_rect: rect, surfaces: opaque_surfaces(rect, &pixels), pixels }
+        let surfaces = opaque_surfaces(rect, &pixels);
+        PreparedSolids(Arc::new(TracedPixels { rect, moving_rect: rect, pixels, surfaces }))
     }
 }
 
@@ -322,22 +357,23 @@ impl Tracer<'_> {
 
 impl Prepared for PreparedSolids {
     fn bounds(&self, _slice: &DepthInterval) -> Rect {
-        self.rect
+        self.0.rect
     }
 
     fn moving_bounds(&self) -> Rect {
-        self.moving_rect
+        self.0.moving_rect
     }
 
     fn opaque_surfaces(&self) -> Option<&OpaqueSurfaces> {
-        Some(&self.surfaces)
+        Some(&self.0.surfaces)
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
-        let touched = self.rect.intersection(&strip.rect);
+        let TracedPixels { rect, pixels, .. } = &*self.0;
+        let touched = rect.intersection(&strip.rect);
         for y in touched.y..touched.bottom() {
             for x in touched.x..touched.right() {
-                let pixel = &self.pixels[(y - self.rect.y) * self.rect.width + x - self.rect.x];
+                let pixel = &pixels[(y - rect.y) * rect.width + x - rect.x];
                 let index = (y - strip.rect.y) * strip.rect.width + x - strip.rect.x;
                 let is_drawn = pixel.coverage > 0.0 && slice.contains(f64::from(pixel.depth));
                 if is_drawn && strip.visible(index, pixel.depth) {

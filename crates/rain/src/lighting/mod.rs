@@ -6,12 +6,14 @@ pub mod drop_phase_function;
 pub(crate) mod equiangular;
 pub mod extinction;
 pub(crate) mod halo_corrections;
+mod halo_drawing;
 pub(crate) mod in_scattering;
 pub(crate) mod lamp_shadows;
 pub(crate) mod ray_segments;
 pub(crate) mod shadow_map;
 pub(crate) mod single_scattering;
 pub(crate) mod sky;
+mod surface_pixels;
 pub(crate) mod tiles;
 
 use in_scattering::LampScatteringCache;

@@ -5,7 +5,6 @@ use std::{ops::Range, sync::Arc};
 
 use bansho_base::{
     camera::directions::Directions,
-    host::once::get_or_compute,
     image::Rect,
     math::{
         DVec2, DVec3,
@@ -18,10 +17,10 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use super::{
     drop_lighting::DropLighting,
     extinction::{ExtinctionProfile, RainExtinction},
-    halo_corrections::{HaloCorrector, HaloRows},
     in_scattering::{InScatterIntegrator, LampScattering, LampScatteringCache},
     ray_segments::{MediumBounds, OpticalDepthTable, RaySegments, any_range},
     sky::SkyLighting,
+    surface_pixels::{select_before_surfaces, surface_columns, surface_depths},
     tiles::{FINE_TILE, GridPosition, TileGrid, geometric_sequence, lerp_color},
 };
 use crate::{
@@ -35,8 +34,6 @@ const FIRST_DISTANCE: f64 = 0.5;
 const DISTANCE_RATIO: f64 = 1.25;
 /// Ratio of successive distances beyond the range of lamps.
 const FAR_DISTANCE_RATIO: f64 = 2.0;
-/// Where the slice before the camera begins at most, over the camera's nearest depth: slices are cut at rounded depths.
-const FIRST_SLICE_MARGIN: f64 = 1.05;
 /// Depth of the medium, m: it has none.
 const NO_DEPTH: [f32; FINE_TILE] = [f32::INFINITY; FINE_TILE];
 /// Positions of pixels across their tile, 0 to 1.
@@ -55,18 +52,29 @@ const _: () = assert!(FINE_TILE == LANES);
 /// Radiance (three colors) and opacity of sixteen segments.
 type Layer = [LaneArray; 4];
 
+/// Lines of sight through a row of pixels.
+#[derive(Clone, Copy)]
+struct LinesOfSight {
+    /// The row of pixels.
+    y: usize,
+    /// Between which rows of corners its middle is.
+    row: GridPosition,
+    /// The first column of tiles.
+    first: usize,
+}
+
 /// Extinction and single scattering along the lines of sight of one frame.
 pub(crate) struct SingleScattering<'a> {
-    level: Level,
-    view: &'a View,
+    pub(super) level: Level,
+    pub(super) view: &'a View,
     /// The sky at the corners of the fine grid, at which in-scattering is stored too.
     sky: Arc<SkyLighting>,
     /// Optical depth by distance.
-    table: OpticalDepthTable,
+    pub(super) table: OpticalDepthTable,
     /// Light of lamps and fires that is scattered toward the camera.
-    lamps: Arc<LampScattering>,
+    pub(super) lamps: Arc<LampScattering>,
     /// Range of the light of lamps, and end of the medium in front of a plate, m.
-    end: f32,
+    pub(super) end: f32,
     /// End of the medium without a plate, m.
     farthest: f32,
     ground: f64,
@@ -125,10 +133,15 @@ impl<'a> SingleScattering<'a> {
     }
 
     /// The bounds of the medium: a plate shows its own far rain.
-    fn bounds(&self) -> MediumBounds<'_> {
+    pub(super) fn bounds(&self) -> MediumBounds<'_> {
         let camera = &self.view.camera;
         let end = if self.view.has_plate { self.end } else { self.farthest };
         MediumBounds { camera, height: (camera.position.y - self.ground) as f32, end }
+    }
+
+    /// Whether a plate bounds the medium at the depths of a strip.
+    pub(super) fn is_before_plate(&self, strip: &Strip) -> bool {
+        self.view.has_plate && strip.has_plate()
     }
 
     /// Sky light at a corner of the row of corners `row`, or between it and the next.
@@ -149,79 +162,69 @@ impl<'a> SingleScattering<'a> {
         (endless - once).fma(rescattered, once).simd_max(once.broadcast(0.0)) * opacity
     }
 
-    /// Adds the corrections near lamps to a row of tiles. Without a plate, those of whole lines of sight are added in the slice before the camera: no slice
-    /// behind it is in front of the ground everywhere.
-    fn add_halos(&self, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
-        let has_plate = strip.has_plate();
-        if !has_plate && slice.near > self.view.camera.near * FIRST_SLICE_MARGIN {
-            return;
-        }
-        let slice = if has_plate { slice } else { &DepthInterval::ALL };
-        let mut scratch = HaloRows::default();
-        for halo in &self.lamps.halos {
-            let rect = halo.rect.intersection(&rows);
-            if rect.is_empty() {
-                continue;
-            }
-            let bounds = self.bounds();
-            let corrector = HaloCorrector { halo, bounds, table: &self.table, lit_end: self.end, slice };
-            for y in rect.y..rect.bottom() {
-                let first = (y - strip.rect.y) * strip.rect.width + rect.x - strip.rect.x;
-                if has_plate {
-                    let plate: Vec<f32> = (0..rect.width).map(|x| strip.plate_depth(first + x)).collect();
-                    let columns = rect.x..rect.right();
-                    let row = dispatch!(self.level, _simd => corrector.row(y, columns, &plate, &mut scratch));
-                    add_corrections(strip, first, &row);
-                } else {
-                    let all = halo.rect.x..halo.rect.right();
-                    let row = get_or_compute(
-                        &halo.corrections[y - halo.rect.y],
-                        || dispatch!(self.level, _simd => corrector.row(y, all, &[], &mut scratch)),
-                    );
-                    add_corrections(strip, first, &row[rect.x - halo.rect.x..rect.right() - halo.rect.x]);
-                }
-            }
-        }
-    }
-
     /// Draws the pixels of `rows` under the contents of the strip. They are within a row of tiles, which spans the rows
     /// `tile` of the picture.
     pub(crate) fn draw(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
-        if strip.has_plate() {
+        if self.is_before_plate(strip) {
             dispatch!(self.level, simd => self.draw_in_front_of_plate(simd, slice, rows, strip));
         } else {
-            dispatch!(self.level, _simd => self.draw_without_plate(slice, tile, rows, strip));
+            dispatch!(self.level, simd => self.draw_without_plate(simd, slice, tile, rows, strip));
         }
         self.add_halos(slice, rows, strip);
     }
 
-    /// Without a plate only the ground bounds the medium: intervals are evaluated at the corners of the grid.
+    /// Without a plate only the ground bounds the medium in most pixels: intervals are evaluated at the corners of the grid. In pixels that show solids they are
+    /// evaluated for each.
     #[inline(always)]
-    fn draw_without_plate(&self, slice: &DepthInterval, tile: Range<usize>, rows: Rect, strip: &mut Strip) {
+    fn draw_without_plate<S: Simd>(
+        &self,
+        simd: S,
+        slice: &DepthInterval,
+        tile: Range<usize>,
+        rows: Rect,
+        strip: &mut Strip,
+    ) {
         let side = self.tiles().side;
         // Whole tiles, whatever part of them the strip shows: the corners, and so the pixels, do not depend on the crop.
         let columns = rows.x / side..rows.right().div_ceil(side) + 1;
         let edges = [tile.start, tile.end].map(|y| self.corners(y, columns.clone(), slice));
+        let mut sums = Vec::new();
         for y in rows.y..rows.bottom() {
             let down = ((y - tile.start) as f32 + 0.5) / tile.len() as f32;
             let start = (y - strip.rect.y) * strip.rect.width;
-            for column in 0..edges[0].len() - 1 {
-                let left = (columns.start + column) * side;
+            let behind = surface_columns(strip, Rect { y, height: 1, ..rows });
+            let behind = behind.start / FINE_TILE..behind.end.div_ceil(FINE_TILE);
+            let lines = LinesOfSight { y, row: self.tiles().row_at(y as f32 + 0.5), first: behind.start };
+            self.interpolate_lamps(&lines, &behind, &mut sums);
+            for column in columns.start..columns.end - 1 {
+                let left = column * side;
                 let visible = left.max(rows.x)..(left + side).min(rows.right());
                 let mut values = [[0.0_f32; FINE_TILE]; 4];
                 for (c, values) in values.iter_mut().enumerate() {
-                    let (from, to) = (between(&edges, column, c, down), between(&edges, column + 1, c, down));
+                    let index = column - columns.start;
+                    let (from, to) = (between(&edges, index, c, down), between(&edges, index + 1, c, down));
                     for (x, value) in values.iter_mut().enumerate() {
                         *value = (to - from).fma((x as f32 + 0.5) * (1.0 / FINE_TILE as f32), from);
                     }
                 }
-                add_layer(
-                    strip,
-                    start + visible.start - strip.rect.x,
-                    &values,
-                    visible.start - left..visible.end - left,
-                );
+                let first = start + visible.start - strip.rect.x;
+                let within = visible.start - left..visible.end - left;
+                if behind.contains(&column) {
+                    let surfaces = surface_depths(strip, first, within.clone(), f32::INFINITY);
+                    let bounded = self.sixteen_pixels(simd, column, &lines, &sums, slice, &surfaces);
+                    select_before_surfaces(&mut values, &bounded.unwrap_or_default(), &surfaces);
+                }
+                add_layer(strip, first, &values, within);
             }
+        }
+    }
+
+    /// The light of lamps between two rows of corners, at both sides of some columns of tiles.
+    #[inline(always)]
+    fn interpolate_lamps(&self, lines: &LinesOfSight, columns: &Range<usize>, sums: &mut Vec<[f32; 4]>) {
+        if let (Some(lamps), false) = (&self.lamps.in_scattering, columns.is_empty()) {
+            let corners = columns.start..columns.end + 1;
+            lamps.interpolate_rows(self.tiles(), lines.row, corners, 0..lamps.distances, sums);
         }
     }
 
@@ -283,43 +286,39 @@ impl<'a> SingleScattering<'a> {
     /// A plate may bound the medium at any depth, so intervals are evaluated for each pixel.
     #[inline(always)]
     fn draw_in_front_of_plate<S: Simd>(&self, simd: S, slice: &DepthInterval, rows: Rect, strip: &mut Strip) {
-        let columns = rows.x / FINE_TILE..rows.right().div_ceil(FINE_TILE) + 1;
+        let columns = rows.x / FINE_TILE..rows.right().div_ceil(FINE_TILE);
         let mut sums = Vec::new();
         for y in rows.y..rows.bottom() {
-            let row = self.tiles().row_at(y as f32 + 0.5);
-            if let Some(lamps) = &self.lamps.in_scattering {
-                lamps.interpolate_rows(self.tiles(), row, columns.clone(), 0..lamps.distances, &mut sums);
-            }
-            for column in columns.start..columns.end - 1 {
+            let lines = LinesOfSight { y, row: self.tiles().row_at(y as f32 + 0.5), first: columns.start };
+            self.interpolate_lamps(&lines, &columns, &mut sums);
+            for column in columns.clone() {
                 let left = column * FINE_TILE;
                 let visible = left.max(rows.x)..(left + FINE_TILE).min(rows.right());
                 let first = (y - strip.rect.y) * strip.rect.width + visible.start - strip.rect.x;
-                // Other pixels are hidden.
-                let mut plate = ZERO_LANES;
                 let within = visible.start - left..visible.end - left;
-                plate[within.clone()].copy_from_slice(strip.plate_depths(first..first + within.len()));
-                let index = column - columns.start;
-                if let Some(layer) = self.sixteen_pixels(simd, column, index, y, row, &sums, slice, &plate) {
+                // Other pixels are hidden.
+                let plate = surface_depths(strip, first, within.clone(), 0.0);
+                if let Some(layer) = self.sixteen_pixels(simd, column, &lines, &sums, slice, &plate) {
                     add_layer(strip, first, &layer, within);
                 }
             }
         }
     }
 
-    /// Radiance and opacity of the sixteen pixels of a tile in row `y`, in front of a `plate` (depths, m); `None` where it hides all. `sums` has
-    /// the light of lamps in this row, whose column `index` is that of the tile.
+    /// Radiance and opacity of the sixteen pixels of a tile, in front of a `plate` (depths, m); `None` where it hides all. `sums` has the light of lamps of these
+    /// lines of sight.
     #[inline(always)]
     fn sixteen_pixels<S: Simd>(
         &self,
         simd: S,
         column: usize,
-        index: usize,
-        y: usize,
-        row: GridPosition,
+        lines: &LinesOfSight,
         sums: &[[f32; 4]],
         slice: &DepthInterval,
         plate: &LaneArray,
     ) -> Option<Layer> {
+        let LinesOfSight { y, row, first } = *lines;
+        let index = column - first;
         let mut directions = Directions::new(&self.view.camera, column * FINE_TILE, y);
         let ranges = self.bounds().ranges(&mut directions, slice, plate);
         if !any_range(&ranges) {
@@ -374,15 +373,4 @@ fn add_layer(strip: &mut Strip, first: usize, layer: &Layer, part: Range<usize>)
     let [red, green, blue, opacity] = layer.each_ref().map(|row| &row[part.clone()]);
     strip.add_row_behind(first, [red, green, blue], Some(opacity), &NO_DEPTH[..part.len()]);
     add_optical_depths(&mut strip.aovs, first, opacity);
-}
-
-/// Adds corrections to consecutive pixels of a strip. The medium in front of them is contained in the strip's transmittance too; its effect is small.
-fn add_corrections(strip: &mut Strip, first: usize, corrections: &[[f32; 3]]) {
-    for c in 0..3 {
-        for (value, light) in strip.radiance[c][first..].iter_mut().zip(corrections) {
-            if *light != [0.0; 3] {
-                *value += light[c];
-            }
-        }
-    }
 }

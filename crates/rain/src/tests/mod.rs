@@ -296,6 +296,48 @@ fn the_plate_hides_all_rain_behind_it() {
 }
 
 #[test]
+fn a_solid_bounds_the_rain_in_its_own_pixels_alone() {
+    let wind = wind([0.0; 3], 0.0);
+    let surroundings = lit(&wind);
+    let view = view_at(1.0, 0.02, [96, 54]);
+    let rain = rain(RainParameters::default(), 1);
+    let caches = LightCaches::default();
+    let prepared = PreparedRain::new(&rain, &caches, &view, &surroundings);
+    // The post is in front of the lamp's halo, and neither of its edges is at the edge of a tile.
+    let post = 37..51;
+    let depths: Vec<f32> = (0..96).map(|x| if post.contains(&x) { 2.5 } else { f32::INFINITY }).collect();
+    let draw = |rect: Rect, depths: Option<&[f32]>, slices: &[f64]| {
+        let mut strip = Strip::default();
+        let row = |_: usize| depths.unwrap_or_default();
+        strip.reset(rect, depths.is_some().then_some(&row as _), 0);
+        for pair in slices.windows(2) {
+            prepared.draw(&DepthInterval { near: pair[0], far: pair[1] }, &mut strip);
+        }
+        strip
+    };
+    let (all, whole) = ([0.0, f64::INFINITY], Rect::from_size(96, 54));
+    let (free, before_post) = (draw(whole, None, &all), draw(whole, Some(&depths), &all));
+    let wall = draw(whole, Some(&[2.5; 96]), &all);
+    for index in 0..before_post.len() {
+        let expected = if post.contains(&(index % 96)) { &wall } else { &free };
+        assert_eq!(
+            before_post.radiance.each_ref().map(|c| c[index]),
+            expected.radiance.each_ref().map(|c| c[index]),
+            "{index}"
+        );
+        assert_eq!(before_post.transmittance(index), expected.transmittance(index), "{index}");
+    }
+    let sum = |strip: &Strip| strip.radiance[1].iter().sum::<f32>();
+    assert!(sum(&wall) < 0.8 * sum(&before_post) && sum(&before_post) < 0.95 * sum(&free), "the post hides rain");
+    let rect = Rect { x: 40, y: 13, width: 50, height: 11 };
+    let part = draw(rect, Some(&depths), &all);
+    for index in 0..part.len() {
+        let there = (index / rect.width + rect.y) * 96 + index % rect.width + rect.x;
+        assert_eq!(part.radiance[1][index], before_post.radiance[1][there], "{index}");
+    }
+}
+
+#[test]
 fn any_rain_gives_finite_pictures() {
     let lenses = [
         bansho_base::camera::Lens::Perspective,

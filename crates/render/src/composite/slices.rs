@@ -20,9 +20,13 @@ const MAX_SLICES: usize = 256;
 /// `intervals[i]` are the intervals that phenomenon `i` fills. Neighboring slices with the same members are separate only where another
 /// phenomenon begins or ends between them. Members of a slice are sorted from near to far and, at equal depth, by name: the picture must not depend on the
 /// order of the scene's tables. `names[i]` is `None` for what is shared by the scene (lamps, obstacles, ground, sky), which follows all others in its order.
-pub(crate) fn cut(intervals: &[Vec<DepthInterval>], names: &[Option<&str>]) -> Vec<Slice> {
-    let intervals: Vec<Vec<DepthInterval>> =
+///
+/// `opaque` is the only phenomenon with opaque surfaces, if nothing refracts light: all others are hidden behind its surfaces in each pixel, so that it cuts
+/// none of them. It has a slice of its own, behind all slices that begin before it ends.
+pub(crate) fn cut(intervals: &[Vec<DepthInterval>], names: &[Option<&str>], opaque: Option<usize>) -> Vec<Slice> {
+    let mut intervals: Vec<Vec<DepthInterval>> =
         intervals.iter().map(|filled| filled.iter().map(thickened).collect()).collect();
+    let opaque = opaque.and_then(|member| slice_of_all(member, &std::mem::take(&mut intervals[member])));
     let intervals = intervals.as_slice();
     let mut edges: Vec<f64> = intervals
         .iter()
@@ -42,7 +46,18 @@ pub(crate) fn cut(intervals: &[Vec<DepthInterval>], names: &[Option<&str>]) -> V
     merge_to_limit(&mut slices, MAX_CUTS, |slice| cuts_an_interval(intervals, slice));
     merge_to_limit(&mut slices, MAX_SLICES, |_| true);
     slices.iter_mut().for_each(|slice| sort_members(slice, intervals, names));
+    if let Some(opaque) = opaque {
+        let place = slices.partition_point(|slice| slice.interval.near < opaque.interval.far);
+        slices.insert(place, opaque);
+    }
     slices
+}
+
+/// A slice that contains all intervals of a phenomenon and nothing else; `None` if it fills none.
+fn slice_of_all(member: usize, intervals: &[DepthInterval]) -> Option<Slice> {
+    let near = intervals.iter().map(|interval| interval.near).reduce(f64::min)?;
+    let far = intervals.iter().map(|interval| interval.far).reduce(f64::max)?;
+    Some(Slice { interval: DepthInterval { near, far }, members: vec![member] })
 }
 
 /// Whether a member of a slice goes on before or behind it: then it is drawn in several slices, which costs more than one.
@@ -149,7 +164,7 @@ mod tests {
     fn cut(intervals: &[Vec<DepthInterval>]) -> Vec<Slice> {
         let names: Vec<String> = (0..intervals.len()).map(|i| format!("{i:05}")).collect();
         let names: Vec<Option<&str>> = names.iter().map(|name| Some(name.as_str())).collect();
-        super::cut(intervals, &names)
+        super::cut(intervals, &names, None)
     }
 
     #[test]
@@ -161,6 +176,21 @@ mod tests {
             Slice { interval: interval(4.0, 50.0), members: vec![0] },
         ];
         assert_eq!(slices, expected);
+    }
+
+    #[test]
+    fn opaque_surfaces_cut_nothing() {
+        let intervals =
+            [vec![interval(0.0, 50.0)], vec![interval(3.0, 4.0), interval(8.0, 8.0)], vec![interval(5.0, 60.0)]];
+        let slices = super::cut(&intervals, &[Some("rain"), None, None], Some(1));
+        let expected = [
+            Slice { interval: interval(0.0, 5.0), members: vec![0] },
+            Slice { interval: interval(5.0, 50.0), members: vec![0, 2] },
+            Slice { interval: interval(3.0, 8.0_f64.next_up()), members: vec![1] },
+            Slice { interval: interval(50.0, 60.0), members: vec![2] },
+        ];
+        assert_eq!(slices, expected);
+        assert_eq!(super::cut(&[Vec::new()], &[None], Some(0)), [], "none is seen");
     }
 
     #[test]
@@ -198,7 +228,7 @@ mod tests {
         let names: Vec<Option<&str>> =
             tables.iter().map(|(name, _)| (!["ground", "sky"].contains(name)).then_some(*name)).collect();
         let members = |slice: Slice| slice.members.iter().map(|&member| tables[member].0).collect();
-        super::cut(&intervals, &names).into_iter().map(members).collect()
+        super::cut(&intervals, &names, None).into_iter().map(members).collect()
     }
 
     #[test]

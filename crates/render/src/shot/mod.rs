@@ -279,7 +279,7 @@ impl Shot {
             })
             .collect::<Result<_, _>>()?;
         let names = self.table_names(which);
-        let slices = slices::cut(&intervals, &names);
+        let slices = slices::cut(&intervals, &names, lone_opaque_member(&prepared));
         let (prepared, moments) = self.moments(which, prepared, &slices, inputs, observer)?;
         Ok(PreparedSlices { slices, prepared, moments })
     }
@@ -453,4 +453,13 @@ struct PreparedSlices<'a> {
     slices: Vec<Slice>,
     prepared: Vec<Box<dyn Prepared + 'a>>,
     moments: Moments<'a>,
+}
+
+/// The only member with opaque surfaces; `None` if there are several, which would have to hide each other by their depth, or if something refracts the light from
+/// behind it, for which surfaces must be before it or behind it.
+fn lone_opaque_member(prepared: &[PreparedExposure]) -> Option<usize> {
+    let mut opaque = prepared.iter().enumerate().filter(|(_, exposure)| exposure.whole.opaque_surfaces().is_some());
+    let (member, _) = opaque.next()?;
+    let is_lone = opaque.next().is_none() && !prepared.iter().any(|exposure| exposure.whole.may_refract());
+    is_lone.then_some(member)
 }
