@@ -1,7 +1,7 @@
 //! Embeds the scenes of `scenes/` and of its folders `papers/NAME/`, and the meshes that they name. Of plates it embeds the paths.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     env,
     error::Error,
     fmt::Write,
@@ -97,9 +97,17 @@ impl Embedded {
     fn code(self) -> Result<String, std::fmt::Error> {
         let mut code = String::from("/// Every example scene, by name.\npub const SCENES: &[ExampleScene] = &[\n");
         code.extend(self.scenes.into_values());
-        code.push_str("];\n\nconst ASSETS: &[(&str, &[u8])] = &[\n");
+        code.push_str("];\n\n");
+        // Scenes in several folders name one file by several paths.
+        let files: BTreeSet<&PathBuf> = self.assets.values().collect();
+        let files: BTreeMap<&PathBuf, String> =
+            files.into_iter().enumerate().map(|(index, file)| (file, format!("FILE_{index}"))).collect();
+        for (file, constant) in &files {
+            writeln!(code, "static {constant}: &[u8] = include_bytes!({file:?});")?;
+        }
+        code.push_str("\nstatic ASSETS: &[(&str, &[u8])] = &[\n");
         for (path, file) in &self.assets {
-            writeln!(code, "    ({path:?}, include_bytes!({file:?})),")?;
+            writeln!(code, "    ({path:?}, {}),", files[file])?;
         }
         code.push_str("];\n\nconst PLATES: &[(&str, &str)] = &[\n");
         for (path, within) in &self.plates {

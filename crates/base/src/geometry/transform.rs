@@ -31,6 +31,11 @@ impl Transform {
         self.rotation.inverse() * (point - self.position) / self.scale
     }
 
+    /// Local direction of a world-space direction; the length is unchanged.
+    pub fn direction_in_local(&self, direction: DVec3) -> DVec3 {
+        self.rotation.inverse() * direction
+    }
+
     /// World-space direction of a local direction; the length is unchanged.
     pub fn direction_in_world(&self, direction: DVec3) -> DVec3 {
         self.rotation * direction

@@ -19,11 +19,8 @@ pub fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f
     }
     let mut visible = 1.0_f64;
     for caster in casters {
-        if misses_bounds(caster, point, toward, distance, size) {
-            continue;
-        }
         // Not from the point itself: a solid that stands on the ground would shadow all that it touches.
-        let mut travel = 5e-3;
+        let Some([mut travel, end]) = segment_near(caster, point, toward, [5e-3, distance], size) else { continue };
         for _ in 0..MAX_STEPS {
             let near = caster.signed_distance(point + toward * travel);
             // Seen from the point, the light is a disc with a radius of travel * size here, and the nearest surface cuts it at `near` from its
@@ -33,7 +30,7 @@ pub fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f
                 return 0.0;
             }
             travel += near;
-            if travel > distance {
+            if travel > end {
                 break;
             }
         }
@@ -42,25 +39,45 @@ pub fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f
     math::smoothstep(0.0, 1.0, visible)
 }
 
-/// Whether a ray with a cone of angular radius `size` misses the bounding sphere of a solid.
-fn misses_bounds(caster: &Occluder, point: DVec3, toward: DVec3, distance: f64, size: f64) -> bool {
-    let Some((center, radius)) = caster.bounding_sphere() else { return false };
+/// The part of a ray between two distances (m) from which a light of the angular radius `size` may be partly hidden by a solid; `None` if there is none.
+fn segment_near(caster: &Occluder, point: DVec3, toward: DVec3, [from, to]: [f64; 2], size: f64) -> Option<[f64; 2]> {
+    let Some((center, radius)) = caster.bounding_sphere() else { return Some([from, to]) };
     let offset = center - point;
-    let along = offset.dot(toward).clamp(0.0, distance);
+    let along = offset.dot(toward).clamp(0.0, to);
     let reach = radius + along * size;
-    (offset - toward * along).length_squared() > reach * reach
+    if (offset - toward * along).length_squared() > reach * reach {
+        return None;
+    }
+    let Occluder::Mesh { distance, placement } = caster else { return Some([from, to]) };
+    // The box of a mesh fills a small part of its sphere, if it is a post or a car.
+    let margin = DVec3::splat((along + radius) * size / placement.scale);
+    let [low, high] = distance.bounds();
+    let [low, high] = [low - margin, high + margin];
+    let (origin, direction) = (placement.point_in_local(point), placement.direction_in_local(toward) / placement.scale);
+    let [a, b] = [low, high].map(|corner| (corner - origin) / direction);
+    // A ray along a side of the box has no entry there: NaN, which neither `max` nor `min` keeps.
+    let [enter, leave] = [a.min(b), a.max(b)];
+    let enter = enter.to_array().into_iter().fold(from, f64::max);
+    let leave = leave.to_array().into_iter().fold(to, f64::min);
+    (enter <= leave).then_some([enter, leave])
+}
+
+/// Distance from a point to the bounds of a solid, m: the box of a mesh, else a sphere; 0 or less within them, and without bounds.
+fn distance_to_bounds(caster: &Occluder, point: DVec3) -> f64 {
+    let Occluder::Mesh { distance, placement } = caster else {
+        return caster.bounding_sphere().map_or(0.0, |(center, radius)| (center - point).length() - radius);
+    };
+    let ([low, high], local) = (distance.bounds(), placement.point_in_local(point));
+    (local - local.clamp(low, high)).length() * placement.scale
 }
 
 /// Fraction of the sky's light that reaches level ground at `point`: the nearer solids are above it, the less (ambient occlusion).
 pub fn sky_visibility(casters: &[Occluder], point: DVec3) -> f64 {
     let mut visible = 1.0;
     for caster in casters {
-        if let Some((center, radius)) = caster.bounding_sphere() {
-            // From so far away, each sample is nearer to the ground than to the solid, which therefore hides nothing.
-            let reach = radius + 2.0 * SKY_SAMPLES[SKY_SAMPLES.len() - 1][0];
-            if (center - point).length_squared() > reach * reach {
-                continue;
-            }
+        // From so far away, each sample is nearer to the ground than to the solid, which therefore hides nothing.
+        if distance_to_bounds(caster, point) > 2.0 * SKY_SAMPLES[SKY_SAMPLES.len() - 1][0] {
+            continue;
         }
         let hidden = SKY_SAMPLES.map(|[height, weight]| {
             let near = caster.signed_distance(point + DVec3::Y * height).max(0.0);
@@ -73,7 +90,10 @@ pub fn sky_visibility(casters: &[Occluder], point: DVec3) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::geometry::{distance_field::DistanceField, mesh, transform::Transform};
 
     #[test]
     fn a_ball_darkens_its_shadow_and_half_darkens_its_edge() {
@@ -85,6 +105,44 @@ mod tests {
         assert_eq!(seen(0.0, 1.0), 1.0, "a light in front of it is not hidden");
         assert_eq!(visibility(&ball, DVec3::ZERO, DVec3::Y, -0.04, 0.05), 1.0, "within the lamp");
         assert_eq!(visibility(&[], DVec3::ZERO, DVec3::Y, 10.0, 0.05), 1.0);
+    }
+
+    #[test]
+    fn the_box_of_a_mesh_leaves_out_only_what_hides_nothing() {
+        // Turned and scaled.
+        let placement = Transform::new([1.0, 1.5, -0.5], [20.0, 30.0, 10.0], 0.4);
+        let caster = Occluder::Mesh { distance: Arc::new(DistanceField::new(&mesh::cube())), placement };
+        let whole = |point: DVec3, toward: DVec3, distance: f64, size: f64| {
+            let (mut visible, mut travel) = (1.0_f64, 5e-3);
+            for _ in 0..400 {
+                let near = caster.signed_distance(point + toward * travel);
+                visible = visible.min(0.5 + 0.5 * near / (travel * size));
+                // In small steps, so that nothing depends on where they are.
+                travel += (0.25 * near).max(2e-3);
+                if near < CLOSE {
+                    return 0.0;
+                }
+                if travel > distance {
+                    break;
+                }
+            }
+            math::smoothstep(0.0, 1.0, visible)
+        };
+        let (mut hidden, mut partly, mut differing) = (0, 0, 0);
+        for step in 0..4000_u32 {
+            let unit = |prime: f64| (f64::from(step) * prime).fract();
+            let point = DVec3::new(2.0 * unit(0.618_034), 0.0, 2.0 * unit(0.754_878) - 1.5);
+            let toward = DVec3::new(unit(0.569_84) - 0.5, 0.3 + unit(0.2847), unit(0.430_16) - 0.5).normalize();
+            let [seen, expected] =
+                [visibility(std::slice::from_ref(&caster), point, toward, 5.0, 0.05), whole(point, toward, 5.0, 0.05)];
+            differing += u32::from((seen - expected).abs() > 0.12);
+            hidden += u32::from(expected == 0.0);
+            partly += u32::from((0.1..0.9).contains(&expected));
+        }
+        // Some rays graze an edge between two of their steps.
+        assert!(hidden > 150 && partly > 50 && differing < 4, "{hidden} {partly} {differing}");
+        let along_a_side = visibility(std::slice::from_ref(&caster), DVec3::new(1.0, 0.0, -0.5), DVec3::Y, 5.0, 0.05);
+        assert_eq!(along_a_side, 0.0, "a ray along an axis");
     }
 
     #[test]
