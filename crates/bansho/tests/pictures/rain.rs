@@ -84,11 +84,16 @@ fn rain_streaks_are_upright_and_brightest_near_the_lamp() {
 
 #[test]
 fn headlights_light_a_cone_of_rain() {
-    let film = Film::of("headlights", [480, 270], &[30], &SceneOptions::default());
-    // The lamps are in row 148, columns 69 and 120, and emit to the right.
-    let (beam, above, behind) =
-        (mean(&film, 130..165, 130..190), mean(&film, 20..60, 80..140), mean(&film, 130..165, 0..50));
-    assert!(beam > 10.0 * above && beam > 10.0 * behind, "{beam} {above} {behind}");
+    let text = scene_text("headlights");
+    let dark = text.replace("intensity = 12000.0", "intensity = 0.0");
+    assert_ne!(text, dark);
+    let [lit, dark] = [text, dark].map(|text| Film::of_text(&text, [480, 270], &[30], &SceneOptions::default()));
+    let light = |rows: Range<usize>, columns: Range<usize>| {
+        mean(&lit, rows.clone(), columns.clone()) - mean(&dark, rows, columns)
+    };
+    // The headlights are in row 150, columns 103 and 147, and emit to the right.
+    let (beam, above, behind) = (light(130..165, 165..225), light(20..60, 180..240), light(130..165, 0..40));
+    assert!(beam > 0.05 && beam > 10.0 * above && beam > 10.0 * behind, "{beam} {above} {behind}");
 }
 
 #[test]

@@ -136,47 +136,69 @@ impl GridBuilder {
         }
     }
 
-    fn update_distance(&mut self, grid_point: [usize; 3], triangle: u32) {
+    /// Compares a triangle with the nearest one so far of a grid point; whether it is nearer.
+    fn update_distance(&mut self, grid_point: [usize; 3], triangle: u32) -> bool {
         let index = (grid_point[2] * self.size[1] + grid_point[1]) * self.size[0] + grid_point[0];
         let position = Vec3::from(grid_point.map(|coordinate| coordinate as f32));
         let distance = distance_to_triangle(position, self.triangles[triangle as usize]);
-        if distance < self.distance[index] {
+        let is_nearer = distance < self.distance[index];
+        if is_nearer {
             self.distance[index] = distance;
             self.nearest[index] = triangle;
         }
+        is_nearer
     }
 
-    /// Propagates nearest triangles in sweeps along all eight diagonals, twice.
+    /// Propagates nearest triangles in sweeps along all eight diagonals, twice, unless one round of them changes nothing.
     fn sweep(&mut self) {
-        let [width, height, depth] = self.size;
-        for diagonal in 0..16 {
-            // Each bit says whether the sweep goes backward along an axis.
-            let is_backward = [0, 1, 2].map(|bit| diagonal >> bit & 1 == 1);
-            for k in 0..depth {
-                for j in 0..height {
-                    for i in 0..width {
-                        let x = if is_backward[0] { width - 1 - i } else { i };
-                        let y = if is_backward[1] { height - 1 - j } else { j };
-                        let z = if is_backward[2] { depth - 1 - k } else { k };
-                        self.propagate_from_neighbors([x, y, z], diagonal);
-                    }
-                }
+        for _ in 0..2 {
+            let mut changed = false;
+            for diagonal in 0..8 {
+                changed |= self.sweep_along(diagonal);
+            }
+            if !changed {
+                return;
             }
         }
     }
 
-    /// Tries the nearest triangles of the three neighbors of `point` that this sweep has already visited.
-    fn propagate_from_neighbors(&mut self, point: [usize; 3], diagonal: usize) {
-        for axis in 0..3 {
-            let mut neighbor = point;
-            neighbor[axis] = if diagonal >> axis & 1 == 0 { point[axis].wrapping_sub(1) } else { point[axis] + 1 };
-            if neighbor[axis] < self.size[axis] {
-                let triangle = self.nearest[(neighbor[2] * self.size[1] + neighbor[1]) * self.size[0] + neighbor[0]];
-                if triangle != NONE {
-                    self.update_distance(point, triangle);
+    /// A sweep along a diagonal; whether it changes anything.
+    fn sweep_along(&mut self, diagonal: usize) -> bool {
+        let [width, height, depth] = self.size;
+        // Each bit says whether the sweep goes backward along an axis.
+        let is_backward = [0, 1, 2].map(|bit| diagonal >> bit & 1 == 1);
+        let mut changed = false;
+        for k in 0..depth {
+            for j in 0..height {
+                for i in 0..width {
+                    let x = if is_backward[0] { width - 1 - i } else { i };
+                    let y = if is_backward[1] { height - 1 - j } else { j };
+                    let z = if is_backward[2] { depth - 1 - k } else { k };
+                    changed |= self.propagate_from_neighbors([x, y, z], is_backward);
                 }
             }
         }
+        changed
+    }
+
+    /// Tries the nearest triangles of the three neighbors of `point` that this sweep has already visited; whether one is nearer.
+    fn propagate_from_neighbors(&mut self, point: [usize; 3], is_backward: [bool; 3]) -> bool {
+        let strides = [1, self.size[0], self.size[0] * self.size[1]];
+        let index = (0..3).map(|axis| point[axis] * strides[axis]).sum::<usize>();
+        let mut changed = false;
+        for axis in 0..3 {
+            let is_first = if is_backward[axis] { point[axis] + 1 == self.size[axis] } else { point[axis] == 0 };
+            if is_first {
+                continue;
+            }
+            let neighbor = if is_backward[axis] { index + strides[axis] } else { index - strides[axis] };
+            let triangle = self.nearest[neighbor];
+            // Most neighbors share their nearest triangle.
+            if triangle != NONE && triangle != self.nearest[index] {
+                changed |= self.update_distance(point, triangle);
+            }
+        }
+        changed
     }
 
     /// Whether each grid point is inside, by majority vote of the rays along the three axes.
