@@ -180,7 +180,7 @@ fn pixels_of_earlier_frames_are_used_only_while_nothing_changes() {
     change_surroundings(|after| after.others.lights.clear());
     change_surroundings(|after| after.others.extinction = 0.05);
     change_surroundings(|after| {
-        after.others.occluders.push(Occluder::HalfSpace { point: -DVec3::Y, normal: DVec3::Y })
+        after.others.occluders.push(Occluder::HalfSpace { point: -DVec3::Y, normal: DVec3::Y });
     });
     change_surroundings(|after| after.sky = Sky::new(SkyKind::Uniform, 0.5, 6500.0));
     let mut change_view = |change: fn(&mut View)| {
