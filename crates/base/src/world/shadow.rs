@@ -55,7 +55,7 @@ fn segment_near(caster: &Occluder, point: DVec3, toward: DVec3, [from, to]: [f64
     let [low, high] = [low - margin, high + margin];
     let (origin, direction) = (placement.point_in_local(point), placement.direction_in_local(toward) / placement.scale);
     let [a, b] = [low, high].map(|corner| (corner - origin) / direction);
-    // A ray along a side of the box has no entry there: NaN, which neither `max` nor `min` keeps.
+    // NaN where a ray lies in the plane of a side. Whether it then counts as meeting the box does not matter: the margin lies around all that hides the light.
     let [enter, leave] = [a.min(b), a.max(b)];
     let enter = enter.to_array().into_iter().fold(from, f64::max);
     let leave = leave.to_array().into_iter().fold(to, f64::min);
