@@ -1,7 +1,8 @@
 """Times of rain over pictures beside those of other libraries, in one run, and of a data set: `python benches/beside.py [--pairs N] [--check]`.
 
 A table goes to standard output. Rain is drawn at 1280 x 720 over a photograph with depth, from the second call of a size on, with a thread for each core. Other
-libraries draw white lines, without depth and light. With `--check` the exit status tells whether memory stays flat over the pairs.
+libraries draw white lines, without depth and light. With `--check` the exit status tells whether rain and pairs are within their times, and whether memory stays
+flat over the pairs.
 """
 
 from __future__ import annotations
@@ -21,6 +22,11 @@ import bansho
 
 SIZE = (1280, 720)
 CALLS = 25
+# What is asked of two cores: milliseconds of a call by rain rate in mm/h, and of a pair.
+MOST_MILLISECONDS = {20: 40.0, 5: 20.0}
+MOST_MILLISECONDS_PER_PAIR = 40.0
+# Rain that takes longer is timed again, since other programs may have taken its cores.
+TRIES = 3
 FLAT_MEGABYTES = 64
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -52,10 +58,17 @@ def row(what: str, figure: str) -> None:
     print(f"| {what} | {figure} |", flush=True)
 
 
-def rains() -> None:
+def rains() -> list[str]:
+    """Times of rain over a picture. Returns what took longer than it may."""
     image, meters = photograph(SIZE), depth(SIZE)
-    for rate in (20, 5):
-        time_ms = milliseconds(lambda seed, rate=rate: bansho.rain(image, meters, rate_mm_per_h=rate, seed=seed, strength="physical"))
+    slow = []
+    for rate, most in MOST_MILLISECONDS.items():
+        for _ in range(TRIES):
+            time_ms = milliseconds(lambda seed, rate=rate: bansho.rain(image, meters, rate_mm_per_h=rate, seed=seed, strength="physical"))
+            if time_ms <= most:
+                break
+        else:
+            slow.append(f"{rate} mm/h took {time_ms:.0f} ms; allowed: {most:.0f} ms")
         row(f"`bansho.rain`, {rate} mm/h, with depth", f"{time_ms:.0f} ms")
     try:
         import albumentations
@@ -73,39 +86,47 @@ def rains() -> None:
         tensor = torch.from_numpy(image.copy()).permute(2, 0, 1)[None].float() / 255
         drops = kornia.augmentation.RandomRain(p=1.0, drop_height=(1, 20), drop_width=(-5, 5), number_of_drops=(100, 200))
         row(f"kornia {kornia.__version__} `RandomRain`", f"{milliseconds(lambda _: drops(tensor)):.0f} ms")
+    return slow
 
 
-def megabytes() -> float:
-    """Largest memory so far of this process, MB."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (1 << 20 if sys.platform == "darwin" else 1 << 10)
+def peaks() -> np.ndarray:
+    """Largest memory so far of this process, and of any process that it has started and that has ended, MB."""
+    whole = 1 << 20 if sys.platform == "darwin" else 1 << 10
+    return np.array([resource.getrusage(who).ru_maxrss / whole for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)])
 
 
-def pairs(count: int, truth: bool) -> float:
-    """Makes pairs in two processes, and returns by how much the memory of this one grew after the first tenth, MB."""
+def pairs(count: int, truth: bool) -> list[str]:
+    """Makes pairs in two processes. Returns what took longer than it may, and by how much more memory than a tenth of the pairs they took."""
     size = (640, 360)
     data = bansho.datasets.RainPairs([photograph(size)], [depth(size)], per_image=count, seed=1, truth=truth, rate_mm_per_h=(5, 50))
-    start, before = time.perf_counter(), 0.0
-    for number, _ in enumerate(bansho.datasets.iterate(data, workers=2)):
-        if number == count // 10:
-            before = megabytes()
-    elapsed, grown = time.perf_counter() - start, megabytes() - before
-    row(f"{count} pairs of 640 x 360, 5 to 50 mm/h, two processes{', with truth' if truth else ''}", f"{elapsed:.0f} s; memory grew by {grown:.0f} MB after the first tenth")
-    return grown
+    for _ in bansho.datasets.iterate(data, workers=2, indices=range(count // 10)):
+        pass
+    before, start = peaks(), time.perf_counter()
+    for _ in bansho.datasets.iterate(data, workers=2):
+        pass
+    elapsed, grown = time.perf_counter() - start, (peaks() - before).max()
+    what = f"{count} pairs{' with truth' if truth else ''}"
+    row(f"{count} pairs of 640 x 360, 5 to 50 mm/h, two processes{', with truth' if truth else ''}", f"{elapsed:.0f} s; {grown:.0f} MB more than a tenth of them")
+    problems = []
+    if grown > FLAT_MEGABYTES:
+        problems.append(f"{what} took {grown:.0f} MB more than a tenth of them; allowed: {FLAT_MEGABYTES} MB")
+    if elapsed > 1e-3 * MOST_MILLISECONDS_PER_PAIR * count:
+        problems.append(f"{what} took {elapsed:.0f} s; allowed: {1e-3 * MOST_MILLISECONDS_PER_PAIR * count:.0f} s")
+    return problems
 
 
 def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--pairs", type=int, default=1000, help="number of pairs")
-    options.add_argument("--check", action="store_true", help="fail if memory grows")
+    options.add_argument("--check", action="store_true", help="fail if times or memory are above what is asked")
     given = options.parse_args()
     print("| what | time |\n|---|---|")
-    rains()
-    grown = max(pairs(given.pairs, truth) for truth in (False, True))
-    if given.check and grown > FLAT_MEGABYTES:
-        print(f"memory grew by {grown:.0f} MB; allowed: {FLAT_MEGABYTES} MB", file=sys.stderr)
-        return 1
-    return 0
+    problems = [*rains(), *pairs(given.pairs, truth=False), *pairs(given.pairs, truth=True)]
+    if not given.check:
+        return 0
+    for problem in problems:
+        print(problem, file=sys.stderr)
+    return int(bool(problems))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 //! The physics behind the pictures as arrays: black bodies, drops, streaks, auroral light.
 
 use bansho::{
+    Observer,
     aurora::{
         SpectrumShape,
         physics::{
@@ -12,7 +13,10 @@ use bansho::{
             },
         },
     },
-    base::color::{black_body, blackbody::HIGHEST_K, luminance, srgb_from_acescg},
+    base::{
+        color::{black_body, blackbody::HIGHEST_K, luminance, srgb_from_acescg},
+        image::Image,
+    },
     rain::{
         VelocityLaw,
         billboards::texture::StreakCube,
@@ -53,12 +57,20 @@ pub(crate) fn black_body_radiance<'py>(
         "linear_srgb" => false,
         _ => return Err(error::value(format!("space: {space:?}; allowed: \"acescg\", \"linear_srgb\""))),
     };
-    let (mut colors, mut luminances) = (Vec::new(), Vec::new());
-    for kelvin in &temperatures_k {
-        let acescg = black_body().radiance(*kelvin as f32);
-        luminances.push(luminance(acescg));
-        colors.extend(if is_acescg { acescg } else { srgb_from_acescg(acescg) });
-    }
+    let (colors, luminances) = work::run(py, work::thread_count(None)?, |interruption| {
+        let (mut colors, mut luminances) = (Vec::new(), Vec::new());
+        for few in temperatures_k.chunks(TEMPERATURES_BETWEEN_SIGNALS) {
+            if interruption.cancelled() {
+                break;
+            }
+            for kelvin in few {
+                let acescg = black_body().radiance(*kelvin as f32);
+                luminances.push(luminance(acescg));
+                colors.extend(if is_acescg { acescg } else { srgb_from_acescg(acescg) });
+            }
+        }
+        (colors, luminances)
+    })?;
     Ok((frame::array2(py, [temperatures_k.len(), 3], colors)?, luminances.into_pyarray(py)))
 }
 
@@ -120,6 +132,10 @@ pub(crate) fn streak_opacity<'py>(
     Ok(diameters_mm.iter().map(|diameter| opacity(*diameter)).collect::<Vec<_>>().into_pyarray(py))
 }
 
+/// Streaks that are drawn, and temperatures whose radiance is computed, between two looks at whether to stop.
+const DROPS_BETWEEN_SIGNALS: usize = 16;
+const TEMPERATURES_BETWEEN_SIGNALS: usize = 1 << 16;
+
 /// Streak textures of a cube of rain, size x size for each diameter, with the drops: diameter (mm), speed (m/s), position (m).
 #[pyfunction]
 pub(crate) fn streak_textures<'py>(
@@ -138,11 +154,19 @@ pub(crate) fn streak_textures<'py>(
     }
     let cube = StreakCube { edge: edge_m, size, exposure: exposure_s, ..StreakCube::default() };
     cube.check().map_err(|refused| error::value(refused.to_string()))?;
-    let drawn = work::run(py, work::thread_count(None)?, |_| {
+    let drawn = work::run(py, work::thread_count(None)?, |interruption| {
         let (mut textures, mut all_drops) = (Vec::new(), Vec::new());
         for bin in SizeBin::around(&diameters_mm) {
             let drops = cube.drops(&sizes, &bin, seed, variant)?;
-            textures.extend(cube.draw(&drops)?.into_pixels().into_flattened());
+            let mut image = Image::filled(size, size, [0.0]);
+            for few in drops.chunks(DROPS_BETWEEN_SIGNALS) {
+                if interruption.cancelled() {
+                    // Nobody sees what is returned after a signal.
+                    return Ok((textures, all_drops));
+                }
+                cube.draw_over(few, &mut image)?;
+            }
+            textures.extend(image.into_pixels().into_flattened());
             all_drops.push(drops);
         }
         Ok::<_, bansho::rain::billboards::texture::StreakTextureError>((textures, all_drops))

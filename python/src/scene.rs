@@ -2,7 +2,7 @@
 
 use bansho::{
     KINDS, Scene,
-    base::parameters::{Entry, Table, Value},
+    base::parameters::{Entry, Node, Table, Value},
     job::SceneFile,
     parse_scene,
     scene::{
@@ -63,13 +63,8 @@ pub(crate) fn value_at<'py>(
     match find(&root, &segments) {
         Ok(found) => value::to_python(py, found).map(Some),
         // An optional value that is not stated is not in the table, but could be set.
-        Err(_) if is_settable(text, path) => Ok(None),
-        Err(missing) => {
-            let (path, segment) = (path.to_owned(), missing.segment.to_owned());
-            let unknown =
-                EditError::NoSuchPath { path, segment, available: missing.available, suggestions: Vec::new() };
-            Err(error::edit(&unknown))
-        }
+        Err(missing) if !missing.is_ambiguous && is_settable(text, path) => Ok(None),
+        Err(missing) => Err(error::edit(&missing.refused(path))),
     }
 }
 
@@ -87,6 +82,27 @@ fn is_settable(text: &str, path: &str) -> bool {
 struct Missing<'p> {
     segment: &'p str,
     available: String,
+    /// Whether there are several tables, of which none is selected.
+    is_ambiguous: bool,
+}
+
+impl<'p> Missing<'p> {
+    fn new(segment: &'p str, available: String) -> Self {
+        Self { segment, available, is_ambiguous: false }
+    }
+
+    /// No item of a list.
+    fn item(segment: &'p str, items: &[Node]) -> Self {
+        let names = items.iter().filter_map(|item| name_of(&item.value));
+        let names: String = names.map(|name| format!(" or {name}")).collect();
+        let numbers = if items.is_empty() { "nothing".to_owned() } else { format!("0 to {}", items.len() - 1) };
+        Self { segment, available: numbers + &names, is_ambiguous: items.len() > 1 }
+    }
+
+    fn refused(self, path: &str) -> EditError {
+        let (path, segment) = (path.to_owned(), self.segment.to_owned());
+        EditError::NoSuchPath { path, segment, available: self.available, suggestions: Vec::new() }
+    }
 }
 
 /// The value at the remaining `segments` of a path.
@@ -95,7 +111,7 @@ fn find<'v, 'p>(value: &'v Value, segments: &[&'p str]) -> Result<&'v Value, Mis
     match value {
         Value::Table(table) => match table.get(first) {
             Some(node) => find(&node.value, rest),
-            None => Err(Missing { segment: first, available: keys_of(table) }),
+            None => Err(Missing::new(first, keys_of(table))),
         },
         Value::List(items) => {
             let by_name = items.iter().find(|item| name_of(&item.value) == Some(first));
@@ -103,16 +119,10 @@ fn find<'v, 'p>(value: &'v Value, segments: &[&'p str]) -> Result<&'v Value, Mis
             match (by_name.or(by_number), items.as_slice()) {
                 (Some(item), _) => find(&item.value, rest),
                 (None, [only]) => find(&only.value, segments),
-                _ => {
-                    let names = items.iter().filter_map(|item| name_of(&item.value));
-                    let names: String = names.map(|name| format!(" or {name}")).collect();
-                    let numbers =
-                        if items.is_empty() { "nothing".to_owned() } else { format!("0 to {}", items.len() - 1) };
-                    Err(Missing { segment: first, available: numbers + &names })
-                }
+                _ => Err(Missing::item(first, items)),
             }
         }
-        _ => Err(Missing { segment: first, available: "a value, which has no keys".to_owned() }),
+        _ => Err(Missing::new(first, "a value, which has no keys".to_owned())),
     }
 }
 
@@ -144,7 +154,8 @@ pub(crate) fn with_values(text: &str, name: &str, changes: Vec<(String, Bound<Py
 #[pyfunction]
 pub(crate) fn without_value(text: &str, name: &str, path: &str) -> PyResult<String> {
     let root = parse_values(text).unwrap_or_default();
-    let path = located(&Value::Table(root), path);
+    let root = Value::Table(root);
+    let path = located(&root, path).map_err(|missing| error::edit(&missing.refused(path)))?;
     let changed = operation::apply(text, &[Operation::Remove { path }]).map_err(|refused| error::edit(&refused))?;
     parse(&changed, name)?;
     Ok(changed)
@@ -162,12 +173,15 @@ pub(crate) fn with_table(text: &str, name: &str, kind: &str, table: &Bound<PyAny
 }
 
 /// The path of a value in `root`. The number of a table may be its name, and may be left out where there is only one.
-fn located(root: &Value, path: &str) -> ValuePath {
+fn located<'p>(root: &Value, path: &'p str) -> Result<ValuePath, Missing<'p>> {
     let (mut value, mut located) = (Some(root), ValuePath::root());
     for segment in path.split('.').map(str::trim) {
         if let Some(Value::List(items)) = value {
             let index = items.iter().position(|item| name_of(&item.value) == Some(segment));
             let index = index.or_else(|| segment.parse().ok());
+            if index.is_none() && items.len() > 1 {
+                return Err(Missing::item(segment, items));
+            }
             let taken = index.unwrap_or(0);
             located = located.index(taken);
             value = items.get(taken).map(|node| &node.value);
@@ -181,7 +195,7 @@ fn located(root: &Value, path: &str) -> ValuePath {
             _ => None,
         };
     }
-    located
+    Ok(located)
 }
 
 /// The text of a scene of dictionaries; checked.

@@ -84,6 +84,24 @@ def test_wrong_arguments_of_rain(arguments, message):
         (lambda: bansho.labels.boxes([1]), r"mask: an array of shape \(1,\); allowed: \(height, width\)"),
         (lambda: bansho.transforms.Rain((5, 500)), r"rate_mm_per_h: \(5, 500\); allowed: rates above 0, up to 300"),
         (lambda: bansho.transforms.Rain(exposure_s=0), "exposure_s: 0; allowed: times above 0 s"),
+        # At once, not by the first call in a worker process.
+        (lambda: bansho.transforms.Rain(visibility="x"), 'visibility: .x.; allowed: "physical", "augment"'),
+        (lambda: bansho.transforms.Rain(strength=500), "strength: 500; allowed: "),
+        (lambda: bansho.transforms.Rain(threads="x"), "threads: 'x'; allowed: 1 to 1024"),
+        (lambda: bansho.datasets.RainPairs([IMAGE], seed=-1), "seed: -1; allowed: a whole number from 0 to 9e15"),
+        (lambda: bansho.datasets.AllSkyAurora(1, seed=1.5), "seed: 1.5; allowed: a whole number from 0 to 9e15"),
+        (lambda: bansho.datasets.AllSkyAurora(1, energy_ev=(-1, 5)), r"energy_ev: \(-1, 5\); allowed: numbers above 0"),
+        (lambda: bansho.rain(IMAGE[None], seed=-1, strength=1), "seed: -1; allowed: a whole number from 0 to 9e15"),
+        (lambda: bansho.rain(IMAGE, pose=np.zeros((0, 4, 4)), strength=1), r"pose: an array of shape \(0, 4, 4\); allowed: 4 x 4"),
+        (lambda: bansho.rain(IMAGE, pose=np.full((4, 4), np.nan), strength=1), "pose: a matrix with a value that is not finite"),
+        (lambda: bansho.open(bansho.FlameSheet(), size=(8, 8)).display(0, bits=300), "bits: 300; allowed: 8, 16"),
+        (lambda: bansho.open({}, arrays=[1]), "arrays: a list; allowed: a dict of arrays"),
+        (lambda: bansho.Scene(7), "a scene of 7; allowed: tables such as bansho.Rain"),
+        (lambda: bansho.Scene([bansho.Camera(), bansho.Camera()]), "two tables `camera` in a scene; allowed: one"),
+        (lambda: bansho.Scene({}).add(bansho.RainSplashes()), "a RainSplashes; allowed: a table of a scene"),
+        (lambda: bansho.Effect(bansho.FlameSheet(), size=(8, 4)).depth(np.zeros((4, 8), np.float32, order="F")), "out: pixels that are not one after the other"),
+        (lambda: bansho.Effect(bansho.FlameSheet()).advance(2**2000), "dt: .*; allowed: a number of seconds"),
+        (lambda: bansho.labels.rle(["x"]), "mask: a list; allowed: an array of numbers"),
     ],
 )
 def test_wrong_arguments_of_others(call, message):
@@ -104,7 +122,13 @@ def test_options_that_do_not_exist_are_told_at_once(call):
         call()
 
 
+def test_every_pair_has_rain():
+    with pytest.raises(TypeError, match="unknown option 'p': every pair has rain"):
+        bansho.datasets.RainPairs([IMAGE], p=0.25)
+
+
 def test_no_pictures_make_none():
+    assert bansho.rain(np.zeros((0, 9, 9, 3), np.uint8), strength=1, truth=True)[1] == []
     assert bansho.rain(np.zeros((0, 9, 9, 3), np.uint8), strength=1).shape == (0, 9, 9, 3)
 
 

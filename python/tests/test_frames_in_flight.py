@@ -172,10 +172,13 @@ def test_other_threads_run_while_frames_are_waited_for(scene):
 
     thread = threading.Thread(target=count)
     thread.start()
+    start = time.perf_counter()
     assert len(list(shot.frames(frames_in_flight=2))) == 12
+    elapsed = time.perf_counter() - start
     is_done.set()
     thread.join()
-    assert counted[0] > 5
+    # With the interpreter held, it counts once or twice in each call.
+    assert counted[0] > 0.1 * elapsed / 0.001, f"{counted[0]} in {elapsed:.2f} s"
 
 
 def test_progress_is_told_for_each_frame(scene):

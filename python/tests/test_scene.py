@@ -45,6 +45,8 @@ def test_changes_keep_comments_and_lines():
     scene.add(bansho.Fog(visibility_m=300))
     scene.add(bansho.FlameSheet(name="candle"))
     assert scene["fog.visibility_m"] == 300 and scene["flame_sheet.candle.name"] == "candle"
+    scene.add(bansho.Fog())
+    assert scene["fog.visibility_m"] == 500 and "\n[fog]\n" in scene.to_toml()
 
 
 def test_an_error_has_the_programs_words_line_key_and_what_is_allowed():
@@ -114,6 +116,29 @@ def test_tables_and_values_that_are_stated_are_in_a_scene():
     scene.add(bansho.Camera())
     del scene["rain.1"]
     assert "camera" in scene and "rain.splashes" in scene
+
+
+def test_one_of_several_tables_is_selected_by_number_or_name():
+    scene = bansho.Scene([bansho.FlameSheet(height=1.6), bansho.FlameSheet(name="torch", height=2.0)])
+    assert scene["flame_sheet.torch.height"] == 2.0 and "flame_sheet.torch.height" in scene
+    for path in ("flame_sheet.height", "flame_sheet.lamp.height"):
+        with pytest.raises(bansho.SceneError, match="0 to 1 or .*torch"):
+            scene[path]
+        with pytest.raises(bansho.SceneError, match="0 to 1 or .*torch"):
+            del scene[path]
+        assert path not in scene
+    # All of them.
+    scene["flame_sheet.height"] = 3.0
+    assert scene["flame_sheet.0.height"] == scene["flame_sheet.torch.height"] == 3.0
+    del scene["flame_sheet.torch.height"]
+    assert scene["flame_sheet.0.height"] == 3.0 and "flame_sheet.torch.height" not in scene
+
+
+def test_what_takes_a_scene_takes_tables():
+    size = {"size": (16, 9)}
+    expected = bansho.open(bansho.Scene([bansho.FlameSheet()]), **size).render(0).linear
+    for tables in (bansho.FlameSheet(), [bansho.FlameSheet()], {"flame_sheet": [{}]}, bansho.Scene(bansho.FlameSheet())):
+        assert np.array_equal(bansho.open(tables, **size).render(0).linear, expected)
 
 
 @pytest.mark.parametrize("number", [float("nan"), float("-inf"), np.float32("nan"), np.float64("inf")])

@@ -81,16 +81,20 @@ def interrupted_after(seconds, work):
         signal.signal(signal.SIGINT, handler)
 
 
-def test_an_interrupt_stops_the_work_within_100_ms():
+def test_an_interrupt_stops_the_work_within_100_ms(tmp_path):
     scene = bansho.Scene.parse(LONG)
     shot, effect = bansho.open(scene), bansho.Effect(scene)
     several = bansho.open(bansho.Scene([bansho.Picture(size=(960, 540), frames=10_000), bansho.FlameSheet(), bansho.Rain()]))
+    large = bansho.open(bansho.Scene([bansho.Picture(size=(3840, 2160), frames=1000), bansho.FlameSheet()]))
     image = np.full((2160, 3840, 3), 90, np.uint8)
     calls = {
         "render": lambda: shot.render(199),
         "at": lambda: effect.at(6.0),
         "rain": lambda: [bansho.rain(image, rate_mm_per_h=80, strength=10.0, seed=seed) for seed in range(100)],
+        # Most of the time goes into the compression of files.
+        "write": lambda: large.write(tmp_path / "f.####.exr"),
         "frames": lambda: list(several.frames(frames_in_flight=3)),
+        "streaks": lambda: bansho.streaks(20, size=4096),
         # The start of a loop is searched for.
         "open": lambda: [bansho.open(bansho.Scene([bansho.FlameSheet(), bansho.Rain(rate_mm_per_h=100)]), loop_s=8.0, seed=seed) for seed in range(400)],
     }
@@ -115,11 +119,14 @@ def test_other_threads_run_while_a_frame_is_drawn():
 
     thread = threading.Thread(target=count)
     thread.start()
+    start = time.perf_counter()
     for number in range(10):
         shot.render(number)
+    elapsed = time.perf_counter() - start
     is_done.set()
     thread.join()
-    assert counted[0] > 5
+    # With the interpreter held, it counts once or twice in each call.
+    assert counted[0] > 0.1 * elapsed / 0.001, f"{counted[0]} in {elapsed:.2f} s"
 
 
 def test_a_shot_may_be_used_from_several_threads(torch_scene):

@@ -31,8 +31,7 @@ from cluster import Cluster, why_not
 
 PICTURE = "bansho = 2\n[picture]\nsize = [{width}, {height}]\nframes = {frames}\n"
 AURORA = "[[aurora]]\npreroll_s = 0.1\nparticles = {{ count = {particles} }}\nfield = {{ cells = 63 }}\n"
-# Drizzle over wet ground: much to draw for the bytes of a frame, and no file besides.
-RAIN = pathlib.Path(__file__).resolve().parents[2] / "scenes/drizzle.toml"
+RAIN = pathlib.Path(__file__).resolve().parent / "rain.toml"
 RAIN_FRAMES = "frames = 240\n"
 # CPU time of all tasks over that of one process, snapshots, checks and measuring included.
 MAX_CPU_RATIO = 1.10

@@ -2,7 +2,7 @@
 
 use std::{io, path::PathBuf};
 
-use bansho_base::host::plural::counted;
+use bansho_base::host::{observer::Cancelled, plural::counted};
 
 use crate::format::{PictureFormat, extensions_without_ffmpeg};
 
@@ -10,6 +10,9 @@ use crate::format::{PictureFormat, extensions_without_ffmpeg};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MediaError {
+    /// The observer asked to stop while the picture was encoded.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The disk is full.
     #[error(
         "{path}: the disk is full; no incomplete file was left there. Free some space or choose another folder",

@@ -11,7 +11,10 @@ from ._program import program
 
 def main() -> int:
     """Runs the program with the arguments of Python."""
-    command = [str(program()), *sys.argv[1:]]
+    try:
+        command = [str(program()), *sys.argv[1:]]
+    except FileNotFoundError as missing:
+        sys.exit(str(missing))
     if os.name == "nt":
         return subprocess.call(command)
     os.execv(command[0], command)

@@ -56,8 +56,10 @@ def checked_pose(pose: Any, name: str = "pose") -> NDArray[np.float64]:
     """A pose as a matrix 4 x 4, world from camera: right, up, backward, in m, y up."""
     allowed = ALLOWED_POSE
     matrix = _checks.numbers(pose, name, allowed)
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+    if matrix.shape != (4, 4):
         raise ValueError(f"{name}: an array of shape {matrix.shape}; allowed: {allowed}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name}: a matrix with a value that is not finite; allowed: {allowed}")
     rotation = matrix[:3, :3]
     if not np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0 or not np.allclose(matrix[3], [0, 0, 0, 1]):
         raise ValueError(f"{name}: {matrix.tolist()} is no rotation with a translation; allowed: {allowed}")

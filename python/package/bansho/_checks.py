@@ -71,6 +71,13 @@ def sides(given: Any, name: str) -> tuple[int, ...] | None:
     return pixels
 
 
+def bits(given: Any) -> int:
+    """Bits of a display code."""
+    if isinstance(given, bool) or given not in (8, 16):
+        raise ValueError(f"bits: {shortened(given)}; allowed: 8, 16")
+    return int(given)
+
+
 def threads(given: Any) -> int | None:
     """A number of threads, or `None` for one for each core."""
     return None if given is None else whole(given, "threads", "1 to 1024, or None for one for each core")

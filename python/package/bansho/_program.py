@@ -17,5 +17,5 @@ def program() -> Path:
             return binary
     found = shutil.which("bansho")
     if found is None:
-        raise SystemExit("bansho: the program is not installed with this package; install a wheel that has it, or the program itself")
+        raise FileNotFoundError("bansho: the program is not installed with this package; install a wheel that has it, or the program itself")
     return Path(found)

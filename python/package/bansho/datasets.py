@@ -60,7 +60,8 @@ class RainPairs:
         """`images` are arrays (H, W, 3) of `uint8`, or paths; `depths` arrays or paths (`.npy`, or integers with `depth_scale`), one for each image.
 
         Each image makes `per_image` pairs. With `truth` each item also has `streak_opacity`, `streak_depth`, `diameter_mm`, `transmission` and
-        `medium_transmission`. `transform` changes an item before it is returned, such as to tensors. `rain` are the parameters of `bansho.transforms.Rain`.
+        `medium_transmission`. `transform` changes an item before it is returned, such as to tensors. `rain` are the parameters of `bansho.transforms.Rain`
+        other than `p`.
         """
         if len(images) == 0:
             raise ValueError("images: none; allowed: one or more")
@@ -69,8 +70,10 @@ class RainPairs:
         per_image = _checks.whole(per_image, "per_image", "1 or more")
         if per_image < 1:
             raise ValueError(f"per_image: {per_image}; allowed: 1 or more")
+        if "p" in rain:
+            raise TypeError("unknown option 'p': every pair has rain; allowed: the other parameters of bansho.transforms.Rain")
         self.images, self.depths = images, depths
-        self.per_image, self.seed, self.truth, self.transform = per_image, seed, truth, transform
+        self.per_image, self.seed, self.truth, self.transform = per_image, _checks.seed(seed), truth, transform
         self.rain = transforms.Rain(**rain)
 
     def __len__(self) -> int:
@@ -96,6 +99,14 @@ class RainPairs:
         return item if self.transform is None else self.transform(item)
 
 
+def _positive(value: Any, name: str) -> tuple[float, float]:
+    """The ends of an interval of numbers above 0."""
+    ends = transforms.interval(value, name)
+    if ends[0] <= 0:
+        raise ValueError(f"{name}: {value!r}; allowed: numbers above 0")
+    return ends
+
+
 class AllSkyAurora:
     """All-sky pictures of auroras with the brightness of their lines in kilorayleighs: a map-style data set.
 
@@ -111,17 +122,18 @@ class AllSkyAurora:
         *,
         size: int = 256,
         seed: int = 0,
-        energy_ev: tuple[float, float] = (1000.0, 10_000.0),
-        flux_mw_per_m2: tuple[float, float] = (1.0, 50.0),
+        energy_ev: transforms.Interval = (1000.0, 10_000.0),
+        flux_mw_per_m2: transforms.Interval = (1.0, 50.0),
         particles: int = 20_000,
         exposure_ev100: float | None = None,
     ) -> None:
-        """Energies and energy fluxes are drawn evenly in their logarithms."""
+        """Energies and energy fluxes are numbers, or intervals (low, high) of which values are drawn evenly in their logarithms."""
         count = _checks.whole(count, "count", "1 or more")
         if count < 1:
             raise ValueError(f"count: {count}; allowed: 1 or more")
-        self.count, self.size, self.seed, self.particles = count, size, seed, particles
-        self.energy_ev, self.flux_mw_per_m2, self.exposure_ev100 = energy_ev, flux_mw_per_m2, exposure_ev100
+        self.count, self.size, self.seed, self.particles = count, size, _checks.seed(seed), particles
+        self.energy_ev, self.flux_mw_per_m2 = _positive(energy_ev, "energy_ev"), _positive(flux_mw_per_m2, "flux_mw_per_m2")
+        self.exposure_ev100 = exposure_ev100
 
     def __len__(self) -> int:
         return self.count

@@ -47,10 +47,6 @@ class Effect:
 
         `max_steps` is the number of simulation steps of one `advance`, 60 by default; see `bansho.open` for the others.
         """
-        if isinstance(scene, SceneTable):
-            scene = [scene]
-        if isinstance(scene, Sequence) and not isinstance(scene, str):
-            scene = Scene(scene)
         described = as_scene(scene)
         self._effect = _bansho.Effect(
             described.to_toml(),
@@ -162,8 +158,10 @@ class Effect:
             raise ValueError(f"out: an array of {buffer.dtype}; allowed: {np.dtype(dtype)}")
         if buffer.shape != (height, width, *channels):
             raise ValueError(f"out: an array of shape {list(buffer.shape)}; allowed: {(height, width, *channels)}")
+        if not buffer.flags["C"]:
+            raise ValueError("out: pixels that are not one after the other, row by row; allowed: an array in C order without gaps")
         if not buffer.flags["W"]:
-            raise ValueError("out: cannot be written; allowed: a writable array in main memory")
+            raise ValueError("out: cannot be written; allowed: a writable array in main memory (by DLPack with numpy 2.1 or later)")
         return buffer
 
     @property
@@ -204,6 +202,6 @@ class Effect:
 
 def _time(value: Any, name: str) -> float:
     """A time, s; whether it is finite is checked where what is allowed is known."""
-    if isinstance(value, (float, int)):
-        return float(value)
+    if isinstance(value, float):
+        return value
     return _checks.number(value, name, "a number of seconds")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from . import _bansho
+from . import _bansho, _checks
 from .tables import SceneTable
 
 __all__ = ["Scene"]
@@ -24,18 +24,25 @@ class Scene:
 
     __slots__ = ("_folder", "_name", "_text")
 
-    def __init__(self, tables: Mapping[str, Any] | Iterable[SceneTable] = (), *, folder: str | os.PathLike[str] = "") -> None:
+    def __init__(self, tables: Mapping[str, Any] | SceneTable | Iterable[SceneTable] = (), *, folder: str | os.PathLike[str] = "") -> None:
         """A scene of tables: a dict as a scene file has it, or builders such as `bansho.Rain(rate_mm_per_h=20)`.
 
         Paths of files in it count from `folder`.
         """
+        if isinstance(tables, SceneTable):
+            tables = [tables]
         if not isinstance(tables, Mapping):
+            allowed = "tables such as bansho.Rain(...), or a dict"
+            if isinstance(tables, (str, bytes)) or not isinstance(tables, Iterable):
+                raise ValueError(f"a scene of {_checks.shortened(tables)}; allowed: {allowed}")
             collected: dict[str, Any] = {}
             for table in tables:
                 if not isinstance(table, SceneTable):
-                    raise ValueError(f"a {type(table).__name__} in a scene; allowed: tables such as bansho.Rain(...), or a dict")
+                    raise ValueError(f"a {type(table).__name__} in a scene; allowed: {allowed}")
                 if table.is_list:
                     collected.setdefault(table.key, []).append(table)
+                elif table.key in collected:
+                    raise ValueError(f"two tables `{table.key}` in a scene; allowed: one")
                 else:
                     collected[table.key] = table
             tables = collected
@@ -82,13 +89,14 @@ class Scene:
         """Whether the text states a value, or has a table, at a dotted path."""
         value: Any = self.to_dict()
         for part in str(path).split("."):
-            if isinstance(value, list) and len(value) == 1 and not part.isdecimal():
+            if isinstance(value, list) and len(value) == 1 and not part.isdecimal() and value[0].get("name") != part:
                 value = value[0]
             if isinstance(value, list):
+                named = [item for item in value if isinstance(item, dict) and item.get("name") == part]
                 index = int(part) if part.isdecimal() else len(value)
-                if index >= len(value):
+                if not named and index >= len(value):
                     return False
-                value = value[index]
+                value = named[0] if named else value[index]
             elif isinstance(value, dict) and part in value:
                 value = value[part]
             else:
@@ -109,8 +117,8 @@ class Scene:
 
     def add(self, table: SceneTable) -> None:
         """Adds a table, such as `bansho.FlameSheet(width=0.4)`; of a kind of which a scene has one, replaces it."""
-        if not isinstance(table, SceneTable):
-            raise ValueError(f"a {type(table).__name__}; allowed: a table such as bansho.FlameSheet(width=0.4)")
+        if not isinstance(table, SceneTable) or not table.key:
+            raise ValueError(f"a {type(table).__name__}; allowed: a table of a scene such as bansho.FlameSheet(width=0.4)")
         self._text = _bansho.with_table(self._text, self._name, table.key, table)
 
     def to_toml(self) -> str:

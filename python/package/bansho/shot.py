@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from . import _arrays, _bansho, _checks
 from .frame import Alpha, Frame, FrameCamera, Space, camera_of
 from .scene import Scene
+from .tables import SceneTable
 
 __all__ = ["Shot", "open"]
 
@@ -21,19 +22,21 @@ View = Literal["display", "neutral", "agx", "standard", "raw"]
 Progress = Callable[[int, int], Any]
 
 
-def as_scene(scene: Scene | str | os.PathLike[str] | Mapping[str, Any]) -> Scene:
-    """A scene, the path of its file, or its tables as a dict."""
+def as_scene(scene: Scene | SceneTable | str | os.PathLike[str] | Mapping[str, Any] | Sequence[SceneTable]) -> Scene:
+    """A scene, the path of its file, or its tables: as a dict, or as builders."""
     if isinstance(scene, Scene):
         return scene
-    if isinstance(scene, Mapping):
-        return Scene(scene)
-    return Scene.load(scene)
+    if isinstance(scene, (str, os.PathLike)):
+        return Scene.load(scene)
+    return Scene(scene)
 
 
 def stored_arrays(scene: Scene, arrays: Mapping[str, Any] | None) -> _bansho.Arrays:
     """The arrays that stand for files that a scene names: of an image (H, W), or (H, W, 1, 3 or 4), of a depth (H, W), or a list with one for each frame."""
     stored = _bansho.Arrays(scene.folder, int(scene["picture.first_frame"]))
     named = set(scene.asset_paths)
+    if arrays is not None and not isinstance(arrays, Mapping):
+        raise ValueError(f"arrays: a {type(arrays).__name__}; allowed: a dict of arrays by the name of the file that they stand for")
     for name, given in (arrays or {}).items():
         if name not in named:
             raise ValueError(f"arrays: the scene names no file {name!r}; allowed: {', '.join(sorted(named)) or 'none, since it names no files'}")
@@ -57,7 +60,7 @@ def stored_arrays(scene: Scene, arrays: Mapping[str, Any] | None) -> _bansho.Arr
 
 
 def open(
-    scene: Scene | str | os.PathLike[str] | Mapping[str, Any],
+    scene: Scene | SceneTable | str | os.PathLike[str] | Mapping[str, Any] | Sequence[SceneTable],
     *,
     size: tuple[int, int] | None = None,
     threads: int | None = None,
@@ -75,7 +78,7 @@ def open(
 ) -> Shot:
     """Opens a scene, which builds its phenomena, and plans its shot.
 
-    :param scene: a `Scene`, the path of a scene file, or a dict of tables.
+    :param scene: a `Scene`, the path of a scene file, a dict of tables, or tables such as `bansho.FlameSheet()`.
     :param size: width and height in place of those of the scene, pixels.
     :param threads: how many threads draw; `None` for one for each core. The bytes are the same for any number.
     :param seed: another seed of all random numbers.
@@ -135,7 +138,7 @@ class Shot:
 
     def display(self, number: int = 0, *, alpha: Alpha | None = "encoded", bits: Literal[8, 16] = 8) -> NDArray[Any]:
         """Draws a frame as display codes, without keeping its light: the pixels of the PNG that the program writes. See `Frame.display`."""
-        codes = self._shot.draw_display(_whole(number), bits, alpha)
+        codes = self._shot.draw_display(_whole(number), _checks.bits(bits), alpha)
         return np.ascontiguousarray(codes[..., :3]) if alpha is None else codes
 
     def frames(

@@ -18,7 +18,7 @@ MOST_RAIN_MM_PER_H = 300.0
 """Largest rain rate, mm/h."""
 
 
-def _interval(value: Any, name: str) -> tuple[float, float]:
+def interval(value: Any, name: str) -> tuple[float, float]:
     """A number, or the ends of an interval."""
     allowed = "a number, or (low, high)"
     ends = _checks.numbers(value, name, allowed)
@@ -118,13 +118,17 @@ class Rain(_Transform):
         _known(options, weather.rain, ("rate_mm_per_h", "wind", "exposure_s", "seed", "truth"))
         # `strength` alone says how strong it is.
         super().__init__(p, seed, {"visibility": visibility if strength is None else None, "strength": strength, **options})
-        self.rate_mm_per_h = _interval(rate_mm_per_h, "rate_mm_per_h")
+        self.rate_mm_per_h = interval(rate_mm_per_h, "rate_mm_per_h")
         if not 0 < self.rate_mm_per_h[0] or not self.rate_mm_per_h[1] <= MOST_RAIN_MM_PER_H:
             raise ValueError(f"rate_mm_per_h: {rate_mm_per_h!r}; allowed: rates above 0, up to {MOST_RAIN_MM_PER_H:g}")
-        self.wind_speed = _interval(wind_speed, "wind_speed")
-        self.exposure_s = _interval(exposure_s, "exposure_s")
+        self.wind_speed = interval(wind_speed, "wind_speed")
+        self.exposure_s = interval(exposure_s, "exposure_s")
         if not self.exposure_s[0] > 0:
             raise ValueError(f"exposure_s: {exposure_s!r}; allowed: times above 0 s")
+        # What is wrong is told now, not by the first call in a worker process. The camera belongs to the pictures, whose size is not known.
+        others = {name: value for name, value in self.options.items() if name not in ("camera", "threads")}
+        weather.rain_scene((64, 64), exposure_s=self.exposure_s[0], **others)
+        _checks.threads(options.get("threads"))
 
     def parameters(self, generator: np.random.Generator) -> dict[str, Any]:
         """What `bansho.rain` is called with: drawn from the generator, always in the same order."""
@@ -150,7 +154,8 @@ class Fog(_Transform):
         """The logarithm of the visibility is drawn evenly. `options` are those of `bansho.fog`."""
         _known(options, weather.fog, ("truth",))
         super().__init__(p, seed, options)
-        self.visibility_m = _interval(visibility_m, "visibility_m")
+        _checks.threads(options.get("threads"))
+        self.visibility_m = interval(visibility_m, "visibility_m")
         if self.visibility_m[0] <= 0:
             raise ValueError(f"visibility_m: {visibility_m!r}; allowed: distances above 0")
 

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _arrays, _bansho, _camera, _checks
+from . import _arrays, _bansho, _camera, _checks, _workers
 from .errors import PhysicalStrengthNotice
 from .scene import Scene
 
@@ -217,7 +217,7 @@ def _poses(pose: Any) -> list[NDArray[np.float64]]:
     if pose is None:
         return [_camera.level_pose()]
     array = _checks.numbers(pose, "pose", _camera.ALLOWED_POSE)
-    if array.ndim == 3:
+    if array.ndim == 3 and len(array) > 0:
         return [_camera.checked_pose(matrix, f"pose {index}") for index, matrix in enumerate(array)]
     return [_camera.checked_pose(array)]
 
@@ -244,7 +244,8 @@ def _draw(
     threads: int | None,
 ) -> tuple[NDArray[Any], RainTruth | None]:
     """Draws a frame of a scene over an image."""
-    shot = _cache.shot((*image.shape, depth is None), _checks.threads(threads))
+    threads = _workers.default_threads() if threads is None else _checks.threads(threads)
+    shot = _cache.shot((*image.shape, depth is None), threads)
     encoding = "linear_srgb" if is_linear else "srgb"
     # Codes of 16 bits are floats that are encoded: their light is drawn, and encoded again.
     try:
@@ -313,7 +314,7 @@ def rain(
     :param depth_scale: meters for each unit of the depth.
     :param exposure_ev100: exposure value of the picture at ISO 100; it matters only to lamps and fires.
     :param splashes: fraction of the drops that splash on a level ground 1.6 m below the camera.
-    :param threads: `None` for one for each core.
+    :param threads: `None` for one for each core, and for one in a worker process.
     :param parameters: further keys of `[[rain]]`, such as ``{"distance": 9.0}``. Streaks are drawn within 5 m, and it rains within 1 km.
     """
     pixels = _arrays.as_numpy(image, "image")
@@ -333,14 +334,16 @@ def rain(
     }
     if pixels.ndim != 4:
         return _rain_one(pixels, depth, {**options, "rate_mm_per_h": rate_mm_per_h, "seed": seed}, 0, truth, threads)
-    rates = _rates(rate_mm_per_h, len(pixels))
+    seed, rates = _checks.seed(seed), _rates(rate_mm_per_h, len(pixels))
     depths = _each(depth, len(pixels))
     drawn = []
     for index, (picture, plane, rate) in enumerate(zip(pixels, depths, rates, strict=True)):
         own = {**options, "rate_mm_per_h": rate, "seed": derived_seed(seed, index)}
         drawn.append(_rain_one(picture, plane, own, 0, truth, threads))
+    if not drawn:
+        return (pixels.copy(), []) if truth else pixels.copy()
     if not truth:
-        return np.stack(drawn) if drawn else pixels.copy()
+        return np.stack(drawn)
     return np.stack([picture for picture, _ in drawn]), [values for _, values in drawn]
 
 

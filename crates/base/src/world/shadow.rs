@@ -7,12 +7,25 @@ use crate::math::{self, DVec3};
 const MAX_STEPS: usize = 48;
 /// Distance from a surface at which it is met, m.
 const CLOSE: f64 = 1e-3;
+/// Distance from a point at which what hides the light from it begins, m.
+const NEAREST: f64 = 5e-3;
 /// Heights above the ground at which the nearness of solids is measured for the light of the sky, m, with weights.
 const SKY_SAMPLES: [[f64; 2]; 4] = [[0.08, 0.25], [0.25, 0.25], [0.6, 0.3], [1.5, 0.2]];
 
 /// Fraction of a light that reaches `point`: it is in direction `toward` (unit vector) at `distance` (m), and has the angular radius `size`. Half shadows
 /// follow from how nearly the ray misses a solid.
 pub fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f64, size: f64) -> f64 {
+    visibility_past(casters.iter(), point, toward, distance, size)
+}
+
+/// As [`visibility`], of any casters.
+fn visibility_past<'a>(
+    casters: impl Iterator<Item = &'a Occluder>,
+    point: DVec3,
+    toward: DVec3,
+    distance: f64,
+    size: f64,
+) -> f64 {
     // Within the lamp nothing is between.
     if distance <= 0.0 {
         return 1.0;
@@ -20,7 +33,9 @@ pub fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f
     let mut visible = 1.0_f64;
     for caster in casters {
         // Not from the point itself: a solid that stands on the ground would shadow all that it touches.
-        let Some([mut travel, end]) = segment_near(caster, point, toward, [5e-3, distance], size) else { continue };
+        let Some([mut travel, end]) = segment_near(caster, point, toward, [NEAREST, distance], size, 0.0) else {
+            continue;
+        };
         for _ in 0..MAX_STEPS {
             let near = caster.signed_distance(point + toward * travel);
             // Seen from the point, the light is a disc with a radius of travel * size here, and the nearest surface cuts it at `near` from its
@@ -39,18 +54,109 @@ pub fn visibility(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f
     math::smoothstep(0.0, 1.0, visible)
 }
 
-/// The part of a ray between two distances (m) from which a light of the angular radius `size` may be partly hidden by a solid; `None` if there is none.
-fn segment_near(caster: &Occluder, point: DVec3, toward: DVec3, [from, to]: [f64; 2], size: f64) -> Option<[f64; 2]> {
+/// The mean of [`visibility`] over a parallelogram with these sides (m) around `point`: the part of a plane that a pixel shows. Most pixels are wholly in the
+/// light or in shadow, which one ray shows; others take four.
+pub fn mean_visibility(
+    casters: &[Occluder],
+    point: DVec3,
+    sides: [DVec3; 2],
+    toward: DVec3,
+    distance: f64,
+    size: f64,
+) -> f64 {
+    /// Positions within the parallelogram: each in another quarter of both sides.
+    const SAMPLES: [[f64; 2]; 4] = [[-0.375, -0.125], [-0.125, 0.375], [0.125, -0.375], [0.375, 0.125]];
+    if distance <= 0.0 {
+        return 1.0;
+    }
+    let spread = 0.5 * (sides[0].length() + sides[1].length());
+    match coverage(casters, point, toward, distance, size, spread) {
+        Coverage::None => 1.0,
+        Coverage::Whole => 0.0,
+        Coverage::Part(casters_near) => {
+            let near = || {
+                casters
+                    .iter()
+                    .enumerate()
+                    .filter(|(index, _)| casters_near & bit(*index) != 0)
+                    .map(|(_, caster)| caster)
+            };
+            let seen = SAMPLES.map(|[first, second]| {
+                let offset = sides[0] * first + sides[1] * second;
+                // A light at infinity is in the same direction everywhere.
+                let (toward, distance) = if distance.is_finite() {
+                    let to_light = toward * distance - offset;
+                    (to_light.normalize_or_zero(), to_light.length())
+                } else {
+                    (toward, distance)
+                };
+                visibility_past(near(), point + offset, toward, distance, size)
+            });
+            0.25 * seen.iter().sum::<f64>()
+        }
+    }
+}
+
+/// How much of a light is hidden from all that is near a point.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Coverage {
+    None,
+    /// Perhaps some, by casters whose [`bit`]s are set.
+    Part(u64),
+    Whole,
+}
+
+/// A bit of a caster. Of more than 64 casters, several have the same.
+fn bit(index: usize) -> u64 {
+    1 << (index % 64)
+}
+
+/// What is hidden of a light, of the angular radius `size`, from points up to `spread` (m) away from `point`.
+fn coverage(casters: &[Occluder], point: DVec3, toward: DVec3, distance: f64, size: f64, spread: f64) -> Coverage {
+    let mut casters_near = 0;
+    for (index, caster) in casters.iter().enumerate() {
+        let segment = segment_near(caster, point, toward, [NEAREST, distance], size, spread);
+        let Some([mut travel, end]) = segment else { continue };
+        for _ in 0..MAX_STEPS {
+            let near = caster.signed_distance(point + toward * travel);
+            // All rays from all these points to the light are within this radius.
+            let radius = travel * size + spread;
+            if near < -radius {
+                return Coverage::Whole;
+            }
+            if near < radius + CLOSE {
+                casters_near |= bit(index);
+            }
+            // On through the solid, which may be thicker farther on.
+            travel += near.abs().max(0.25 * radius).max(CLOSE);
+            if travel > end {
+                break;
+            }
+        }
+    }
+    if casters_near == 0 { Coverage::None } else { Coverage::Part(casters_near) }
+}
+
+/// The part of a ray between two distances (m) from which a light of the angular radius `size`, seen from up to `spread` (m) beside it, may be partly hidden by
+/// a solid; `None` if there is none.
+fn segment_near(
+    caster: &Occluder,
+    point: DVec3,
+    toward: DVec3,
+    [from, to]: [f64; 2],
+    size: f64,
+    spread: f64,
+) -> Option<[f64; 2]> {
     let Some((center, radius)) = caster.bounding_sphere() else { return Some([from, to]) };
     let offset = center - point;
     let along = offset.dot(toward).clamp(0.0, to);
-    let reach = radius + along * size;
+    let reach = radius + along * size + spread;
     if (offset - toward * along).length_squared() > reach * reach {
         return None;
     }
     let Occluder::Mesh { distance, placement } = caster else { return Some([from, to]) };
     // The box of a mesh fills a small part of its sphere, if it is a post or a car.
-    let margin = DVec3::splat((along + radius) * size / placement.scale);
+    let margin = DVec3::splat(((along + radius) * size + spread) / placement.scale);
     let [low, high] = distance.bounds();
     let [low, high] = [low - margin, high + margin];
     let (origin, direction) = (placement.point_in_local(point), placement.direction_in_local(toward) / placement.scale);
@@ -105,6 +211,37 @@ mod tests {
         assert_eq!(seen(0.0, 1.0), 1.0, "a light in front of it is not hidden");
         assert_eq!(visibility(&ball, DVec3::ZERO, DVec3::Y, -0.04, 0.05), 1.0, "within the lamp");
         assert_eq!(visibility(&[], DVec3::ZERO, DVec3::Y, 10.0, 0.05), 1.0);
+    }
+
+    #[test]
+    fn a_pixel_has_the_mean_of_the_shadow_within_it() {
+        let placement = Transform::new([0.0, 1.2, 0.0], [20.0, 30.0, 10.0], 0.4);
+        let cube = Occluder::Mesh { distance: Arc::new(DistanceField::new(&mesh::cube())), placement };
+        let casters = [cube, Occluder::Sphere { center: DVec3::new(1.5, 0.8, 0.0), radius: 0.3 }];
+        let lamp = DVec3::new(0.3, 4.0, -0.5);
+        let sides = [DVec3::X * 0.05, DVec3::Z * 0.3];
+        let (mut edges, mut error) = (0, 0.0_f64);
+        for step in 0..900_u32 {
+            let point = DVec3::new(f64::from(step % 30) * 0.13 - 1.5, 0.0, f64::from(step / 30) * 0.09 - 1.3);
+            let seen_from = |point: DVec3| {
+                let to_light = lamp - point;
+                visibility(&casters, point, to_light.normalize(), to_light.length(), 0.01)
+            };
+            let mut expected = 0.0;
+            for index in 0..256_u32 {
+                let [first, second] = [index % 16, index / 16].map(|part| (f64::from(part) + 0.5) / 16.0 - 0.5);
+                expected += seen_from(point + sides[0] * first + sides[1] * second) / 256.0;
+            }
+            let to_light = lamp - point;
+            let found = mean_visibility(&casters, point, sides, to_light.normalize(), to_light.length(), 0.01);
+            if (0.02..0.98).contains(&expected) {
+                edges += 1;
+                error += (found - expected).abs();
+            } else {
+                assert!((found - expected).abs() < 0.26, "{point}: {found} instead of {expected}");
+            }
+        }
+        assert!(edges > 60 && error < 0.1 * f64::from(edges), "{edges} edges, mean error {}", error / f64::from(edges));
     }
 
     #[test]

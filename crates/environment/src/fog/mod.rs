@@ -20,12 +20,13 @@
 //! # Data flow
 //! The table `[fog]` publishes its extinction, by which solids receive less light from far lamps. [`Fog`] fills all depths. In each slice, a pixel of
 //! `render::PreparedFog` has the transmittance and the light of the part of its line of sight that is within the slice and ends at the plate, at a solid or at the
-//! ground. There is single scattering of lamps and fires without shadows; of the sky, Koschmieder's airlight includes multiple scattering. A plate without depth is
-//! infinitely far away.
+//! ground. `row_cache` keeps them while neither the camera nor the light changes. There is single scattering of lamps and fires without shadows; of the sky,
+//! Koschmieder's airlight includes multiple scattering. A plate without depth is infinitely far away.
 
 mod light_in_fog;
 mod phenomenon;
 mod render;
+mod row_cache;
 mod scattering;
 
 pub use phenomenon::{Fog, FogParameters};

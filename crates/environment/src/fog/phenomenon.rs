@@ -6,19 +6,24 @@ use bansho_base::{
     host::observer::{Cancelled, Observer, check},
     parameters::{Range, animated::Animated},
     phenomenon::{
-        Phenomenon, PhenomenonInfo, Prepared, Run,
+        Phenomenon, PhenomenonInfo, Prepared, Run, SharedMemory,
         strip::{DepthInterval, Shutter, View},
         surroundings::{Publication, Surroundings},
     },
     tables::{BuildContext, BuiltTable, SharedRole, SharedTable, TableCount, TableKind},
 };
 
-use super::{render::PreparedFog, scattering};
+use super::{
+    render::PreparedFog,
+    row_cache::{self, FogCache},
+    scattering,
+};
 
 /// The fog of a scene.
 pub struct Fog {
     /// Meteorological visibility, m.
     visibility_m: Animated<f64>,
+    cache: FogCache,
 }
 
 impl Fog {
@@ -27,7 +32,7 @@ impl Fog {
 
     /// Fog of a meteorological visibility in m.
     pub fn new(visibility_m: Animated<f64>) -> Self {
-        Self { visibility_m }
+        Self { visibility_m, cache: FogCache::default() }
     }
 }
 
@@ -39,6 +44,11 @@ impl Phenomenon for Fog {
     /// Fog emits no light.
     fn luminance(&self) -> f64 {
         0.0
+    }
+
+    /// The rows that are kept from frame to frame, for all frames that are drawn at once.
+    fn shared_memory(&self, view: &View) -> Vec<SharedMemory> {
+        vec![SharedMemory { key: ("rows of fog", 0), bytes: row_cache::estimated_bytes(view) }]
     }
 
     fn start(self: Arc<Self>) -> Box<dyn Run> {
@@ -64,7 +74,7 @@ impl Run for Fog {
     ) -> Result<Box<dyn Prepared + 'a>, Cancelled> {
         check(observer)?;
         let extinction = scattering::extinction(self.visibility_m.at(view.shutter.middle()));
-        Ok(Box::new(PreparedFog::new(extinction, view, surroundings)))
+        Ok(Box::new(PreparedFog::new(extinction, view, surroundings, &self.cache)))
     }
 }
 

@@ -1,5 +1,7 @@
 //! A prepared frame of fog.
 
+use std::sync::Arc;
+
 use bansho_base::{
     camera::directions::Directions,
     image::Rect,
@@ -16,7 +18,10 @@ use bansho_base::{
 };
 use fearless_simd::{Level, dispatch};
 
-use super::light_in_fog::{LightInFog, Segments};
+use super::{
+    light_in_fog::{LightInFog, Segments},
+    row_cache::{FogBatch, FogCache, FogInputs, FogRows, KeptBatch, SliceRows},
+};
 use crate::ground::height_of_level_ground;
 
 /// Fog in one frame.
@@ -31,6 +36,8 @@ pub(super) struct PreparedFog<'a> {
     height: f32,
     /// Height of the mirror above the camera in a mirrored view, m: fog between the two dims the mirror itself.
     mirror: Option<f32>,
+    /// Fog of earlier frames.
+    cached_rows: Option<Arc<FogRows>>,
 }
 
 /// Optical depth behind which nothing is seen: 1e-9 of the light is left.
@@ -39,18 +46,31 @@ const OPAQUE: f32 = 20.0;
 const NO_DEPTH: [f32; LANES] = [f32::INFINITY; LANES];
 
 impl<'a> PreparedFog<'a> {
-    pub(super) fn new(extinction: f64, view: &'a View, surroundings: &Surroundings) -> Self {
+    pub(super) fn new(extinction: f64, view: &'a View, surroundings: &Surroundings, cache: &FogCache) -> Self {
         let camera = view.camera.position;
+        let extinction = extinction as f32;
         let ground = height_of_level_ground(&surroundings.others.occluders);
         let height = ground.map(|ground| camera.y - ground).filter(|height| *height > 0.0);
+        let height = height.map_or(f32::INFINITY, |height| height as f32);
+        let inputs = FogInputs {
+            camera: view.camera,
+            size: view.size,
+            window: view.window,
+            mirror: view.mirror,
+            extinction,
+            sky: surroundings.sky,
+            lights: surroundings.others.lights.clone(),
+            height,
+        };
         Self {
             level: bansho_base::math::simd::level(),
-            extinction: extinction as f32,
+            extinction,
             view,
             sky: surroundings.sky,
             lights: surroundings.others.lights.iter().filter_map(|light| LightInFog::new(light, camera)).collect(),
-            height: height.map_or(f32::INFINITY, |height| height as f32),
+            height,
             mirror: view.mirror.map(|mirror| (mirror - camera.y) as f32),
+            cached_rows: cache.rows(inputs, view.camera_parameters.is_constant()),
         }
     }
 
@@ -116,23 +136,46 @@ impl<'a> PreparedFog<'a> {
         }
     }
 
+    /// Fog in sixteen pixels from the column `x` on, up to depths `plate`.
+    #[inline(always)]
+    fn batch(&self, [x, y]: [usize; 2], slice: &DepthInterval, plate: &LaneArray) -> FogBatch {
+        let segments = self.segments(&mut Directions::new(&self.view.camera, x, y), slice, plate);
+        let (light, opacity) = self.layer(&segments);
+        FogBatch { light, opacity }
+    }
+
     /// Draws a row of a strip, in batches that begin at the same columns whatever is drawn of the picture.
     #[inline(always)]
-    fn draw_row(&self, y: usize, slice: &DepthInterval, strip: &mut Strip) {
-        let rect = strip.rect;
-        for x in (rect.x / LANES * LANES..rect.right()).step_by(LANES) {
+    fn draw_row(&self, y: usize, slice: &DepthInterval, cached: Option<&SliceRows>, strip: &mut Strip) {
+        let (rect, window) = (strip.rect, self.view.window);
+        let is_whole = rect.x == window.x && rect.width == window.width;
+        let cached = cached.filter(|_| is_whole).map(|rows| rows.row(y - window.y));
+        let known_row = cached.and_then(|row| row.get());
+        let mut new_row = Vec::new();
+        for (index, x) in (rect.x / LANES * LANES..rect.right()).step_by(LANES).enumerate() {
+            let kept = known_row.map(|row| &row[index]);
+            if kept.is_some_and(KeptBatch::is_empty) {
+                continue;
+            }
             let drawn = x.max(rect.x)..(x + LANES).min(rect.right());
             let first = (y - rect.y) * rect.width + drawn.start - rect.x;
             let mut plate = NO_DEPTH;
             for column in drawn.clone() {
                 plate[column - x] = strip.plate_depth(first + column - drawn.start);
             }
-            let mut directions = Directions::new(&self.view.camera, x, y);
-            let segments = self.segments(&mut directions, slice, &plate);
-            let (light, opacity) = self.layer(&segments);
             let part = drawn.start - x..drawn.end - x;
+            let known = kept.and_then(|kept| kept.up_to(&plate));
+            let computed = if known.is_none() { Some(self.batch([x, y], slice, &plate)) } else { None };
+            let Some(FogBatch { light, opacity }) = known.or(computed.as_ref()) else { continue };
             let [red, green, blue] = light.each_ref().map(|plane| &plane[part.clone()]);
             strip.add_row_behind(first, [red, green, blue], Some(&opacity[part.clone()]), &NO_DEPTH[part]);
+            if let (Some(_), None, Some(batch)) = (cached, known_row, computed) {
+                new_row.push(KeptBatch::new(batch, &plate));
+            }
+        }
+        if let (Some(row), None) = (cached, known_row) {
+            // Another thread may have computed it meanwhile, to the same numbers.
+            let _ = row.set(new_row);
         }
     }
 }
@@ -143,8 +186,9 @@ impl Prepared for PreparedFog<'_> {
     }
 
     fn draw(&self, slice: &DepthInterval, strip: &mut Strip) {
+        let cached = self.cached_rows.as_ref().and_then(|rows| rows.of_slice(slice));
         for y in strip.rect.y..strip.rect.bottom() {
-            dispatch!(self.level, _simd => self.draw_row(y, slice, strip));
+            dispatch!(self.level, _simd => self.draw_row(y, slice, cached.as_deref(), strip));
         }
     }
 }

@@ -32,7 +32,12 @@ fn view() -> View {
 
 /// Light and transmittance of the pixels of fog in some slices.
 fn drawn(visibility_m: f64, surroundings: &Surroundings, slices: &[f64], plate: Option<f32>) -> Vec<[f32; 2]> {
-    let (fog, view) = (Fog::new(visibility_m.into()), view());
+    drawn_by(&Fog::new(visibility_m.into()), surroundings, slices, plate)
+}
+
+/// As [`drawn`], by fog that may have been drawn before.
+fn drawn_by(fog: &Fog, surroundings: &Surroundings, slices: &[f64], plate: Option<f32>) -> Vec<[f32; 2]> {
+    let view = view();
     let prepared = fog.prepare(&view, surroundings, &Unobserved).unwrap();
     let rect = Rect::from_size(SIZE[0], SIZE[1]);
     let row = plate.map(|depth| vec![depth; SIZE[0]]);
@@ -87,4 +92,25 @@ fn slices_show_the_same_fog_as_one() {
     let distance = 1.5 / math::sin(17.8_f64.to_radians());
     let expected = math::exp(-super::scattering::extinction(80.0) * distance);
     assert!((f64::from(lowest[1]) - expected).abs() < 0.01, "{} and {expected}", lowest[1]);
+}
+
+#[test]
+fn a_second_frame_has_the_fog_of_a_first_one_also_where_a_solid_has_moved() {
+    let wind = wind();
+    let lamp = Emitter::Point { position: DVec3::new(0.3, 2.0, -7.0), radius: 0.05 };
+    let mut surroundings =
+        Surroundings { sky: Sky::new(SkyKind::Overcast, 2.0, 7000.0), ..Surroundings::from_wind(&wind) };
+    surroundings.others.lights.push(Light { emitter: lamp, intensity: [200.0; 3] });
+    let (slices, visibility_m) = ([0.0, 6.9, f64::INFINITY], 80.0);
+    let fog = Fog::new(visibility_m.into());
+    let depths = [Some(9.0), Some(9.0), Some(5.0), None];
+    for plate in depths {
+        let expected = drawn(visibility_m, &surroundings, &slices, plate);
+        assert_eq!(drawn_by(&fog, &surroundings, &slices, plate), expected, "{plate:?}");
+    }
+    surroundings.others.lights[0].intensity = [20.0; 3];
+    for plate in depths {
+        let expected = drawn(visibility_m, &surroundings, &slices, plate);
+        assert_eq!(drawn_by(&fog, &surroundings, &slices, plate), expected, "another light, {plate:?}");
+    }
 }

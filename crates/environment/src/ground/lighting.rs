@@ -10,7 +10,7 @@ use bansho_base::{
         light_batch::{ArrivingLight, RelativeLight},
         surroundings::Occluder,
     },
-    world::shadow::{sky_visibility, visibility},
+    world::shadow::{mean_visibility, sky_visibility, visibility},
 };
 use fearless_simd::prelude::*;
 
@@ -26,11 +26,25 @@ pub(super) struct Shadows<'a> {
     pub(super) camera: DVec3,
     /// Components of the points relative to it, m.
     pub(super) points: [[f32; LANES]; 3],
+    /// Pixels per radian.
+    pub(super) focal_pixels: f64,
 }
 
 impl Shadows<'_> {
     fn point(&self, lane: usize) -> DVec3 {
         self.camera + DVec3::from([0, 1, 2].map(|axis| f64::from(self.points[axis][lane])))
+    }
+
+    /// The sides of the part of the ground that a pixel shows, m: across the line of sight, and along it.
+    fn pixel_sides(&self, lane: usize) -> [DVec3; 2] {
+        /// Least sine of the angle between line of sight and ground: nearer to the horizon, pixels show more than shadows are long.
+        const LEAST_SINE: f64 = 0.02;
+        let line = DVec3::from([0, 1, 2].map(|axis| f64::from(self.points[axis][lane])));
+        let distance = line.length();
+        let ahead = DVec3::new(line.x, 0.0, line.z).normalize_or_zero();
+        let width = distance / self.focal_pixels;
+        let length = width / (-line.y / distance).max(LEAST_SINE);
+        [DVec3::new(-ahead.z, 0.0, ahead.x) * width, ahead * length]
     }
 
     /// Fraction of a light that reaches each point where its luminance on a plane that faces it is more than next to nothing of `whole`, that of all
@@ -56,7 +70,7 @@ impl Shadows<'_> {
             let distance = f64::from(distances[lane]);
             let reach = if distance > 0.0 { distance - SOURCE_RADIUS } else { f64::INFINITY };
             let size = if distance > 0.0 { SOURCE_RADIUS / distance } else { SUN_RADIUS };
-            visibility(self.casters, self.point(lane), toward, reach, size) as f32
+            mean_visibility(self.casters, self.point(lane), self.pixel_sides(lane), toward, reach, size) as f32
         })
     }
 

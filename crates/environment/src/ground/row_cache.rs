@@ -43,6 +43,13 @@ struct ViewInputs {
     has_film: bool,
 }
 
+impl ViewInputs {
+    /// Whether two views show the same part of a picture of the same size.
+    fn has_window_of(&self, other: &Self) -> bool {
+        self.size == other.size && self.window == other.window
+    }
+}
+
 /// What the light depends on, apart from the ground and the view.
 #[derive(Clone, Debug)]
 pub(super) struct LightInputs {
@@ -77,7 +84,7 @@ struct CachedView {
 /// The rows that are kept of a view.
 #[derive(Clone, Debug)]
 pub(super) enum CachedRows {
-    /// None: in the first frame with this camera, which may be moving.
+    /// None: in the first frame with a camera that may be moving.
     None,
     /// The pattern, while lights change.
     Pattern(Arc<Rows<SurfaceSamples>>),
@@ -93,7 +100,8 @@ impl GroundRowCache {
     /// Views kept: a window, and the whole picture that is drawn instead where air refracts light.
     const CAPACITY: usize = 2;
 
-    /// The rows of a view, at first empty.
+    /// The rows of a view, at first empty. A camera that cannot move has them from its first frame on, so that frames drawn at once share them; one that a
+    /// program may move (a live effect) has them from the second frame on, and so has one before a plate, which hides much of each row.
     pub(super) fn rows(&self, view: &View, has_film: bool, light: LightInputs) -> CachedRows {
         let inputs = ViewInputs { camera: view.camera, size: view.size, window: view.window, has_film };
         if view.window.width * view.window.height > MAX_CACHED_PIXELS {
@@ -102,9 +110,12 @@ impl GroundRowCache {
         // The list is always consistent, so a poisoned lock is usable.
         let mut recent = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(index) = recent.iter().position(|cached_view| cached_view.view == inputs) else {
-            recent.insert(0, CachedView { view: inputs, light, rows: CachedRows::None });
+            let is_first = recent.iter().all(|cached_view| !cached_view.view.has_window_of(&inputs));
+            let stays = is_first && !view.has_plate && view.camera_parameters.is_constant();
+            let rows = if stays { CachedRows::Light(empty_rows(view.window.height)) } else { CachedRows::None };
+            recent.insert(0, CachedView { view: inputs, light, rows: rows.clone() });
             recent.truncate(Self::CAPACITY);
-            return CachedRows::None;
+            return rows;
         };
         recent[..=index].rotate_right(1);
         let cached_view = &mut recent[0];
@@ -123,4 +134,56 @@ impl GroundRowCache {
 
 fn empty_rows<T>(height: usize) -> Arc<Rows<T>> {
     Arc::new((0..height).map(|_| OnceLock::new()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use bansho_base::{
+        camera::CameraParameters, math::curve::Interpolation, parameters::animated::Animated,
+        phenomenon::strip::Shutter,
+    };
+
+    use super::*;
+
+    fn view(position: impl Into<Animated<[f64; 3]>>, t: f64) -> View {
+        let camera = CameraParameters { position: position.into(), ..CameraParameters::default() };
+        View::new(camera, Shutter { open: t, close: t }, t + 0.04, [64, 36], 0)
+    }
+
+    fn light(wetness: f64) -> LightInputs {
+        LightInputs {
+            wetness,
+            lights: Vec::new(),
+            shadow_casters: Vec::new(),
+            plate_is_lit: false,
+            sky: Sky::DARK,
+            backdrop: None,
+        }
+    }
+
+    #[test]
+    fn a_camera_that_cannot_move_keeps_light_from_its_first_frame_on() {
+        let cache = GroundRowCache::default();
+        let CachedRows::Light(first) = cache.rows(&view([0.0, 1.2, 4.0], 0.0), false, light(0.5)) else {
+            panic!("no light is kept of the first frame");
+        };
+        let CachedRows::Light(second) = cache.rows(&view([0.0, 1.2, 4.0], 1.0), false, light(0.5)) else {
+            panic!("no light is kept of the second frame");
+        };
+        assert!(Arc::ptr_eq(&first, &second));
+        assert!(matches!(cache.rows(&view([0.0, 1.2, 4.0], 2.0), false, light(0.7)), CachedRows::Pattern(_)));
+    }
+
+    #[test]
+    fn nothing_is_kept_of_the_first_frame_of_a_camera_that_may_move() {
+        let cache = GroundRowCache::default();
+        cache.rows(&view([0.0, 1.2, 4.0], 0.0), false, light(0.5));
+        // A live effect gives each frame a camera of its own.
+        assert!(matches!(cache.rows(&view([0.1, 1.2, 4.0], 0.0), false, light(0.5)), CachedRows::None));
+        let plate = View { has_plate: true, ..view([0.0, 1.2, 4.0], 0.0) };
+        assert!(matches!(GroundRowCache::default().rows(&plate, false, light(0.5)), CachedRows::None));
+        let keys = vec![(0.0, [0.0, 1.2, 4.0]), (9.0, [1.0, 1.2, 4.0])];
+        let keyed = Animated::keyed(keys, Interpolation::Linear).unwrap();
+        assert!(matches!(GroundRowCache::default().rows(&view(keyed, 0.0), false, light(0.5)), CachedRows::None));
+    }
 }

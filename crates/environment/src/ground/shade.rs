@@ -182,7 +182,8 @@ impl PreparedGround<'_> {
             return None;
         }
         let points = [array(hits.offset[0]), array(hits.offset[1]), array(hits.offset[2])];
-        Some(Shadows { casters, camera: self.view.camera.position, points })
+        let focal_pixels = self.view.camera.focal_pixels;
+        Some(Shadows { casters, camera: self.view.camera.position, points, focal_pixels })
     }
 
     /// Light of the sky. What a plate shows already contains the light of its own sky.

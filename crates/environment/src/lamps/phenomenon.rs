@@ -15,7 +15,7 @@ use bansho_base::{
 
 use super::{
     Lamp, Lamps, LightKind, LightParameters,
-    render::{Disc, PreparedLamps, has_glare, project_lamp},
+    render::{Disc, PreparedLamps, project_lamp},
 };
 
 impl Phenomenon for Lamps {
@@ -43,9 +43,9 @@ impl Run for Lamps {
         let mut intervals = Vec::new();
         for lamp in (self.at)(view.shutter.middle()) {
             let Some(disc) = project_lamp(&lamp, view) else { continue };
-            // Glare arises in the lens, in front of everything.
-            let near = if has_glare(view) { 0.0 } else { disc.depth };
-            intervals.push(DepthInterval { near, far: disc.depth.next_up() });
+            // From the camera on, so that a slice ends at the lamp and none begins there: within a slice, lamps are behind all phenomena and fog. Glare arises
+            // in the lens, in front of everything.
+            intervals.push(DepthInterval { near: 0.0, far: disc.depth.next_up() });
         }
         intervals
     }

@@ -11,7 +11,10 @@ use ::exr::{
         header::Header as CrateHeader,
     },
 };
-use bansho_base::frame::{Frame, Precision};
+use bansho_base::{
+    frame::{Frame, Precision},
+    host::observer::{Observer, Unobserved, check},
+};
 
 use super::header::{self, ChannelDeclaration, EncodedHeader, FileColors, Window};
 use crate::{
@@ -35,7 +38,15 @@ const SIDE_LIMIT: usize = 1 << 20;
 /// A size that the format does not allow, channels of another length than the picture, names that are empty, too long or duplicate. `path` is only
 /// used in errors.
 pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
-    encode_with(frame, FileColors::Acescg, path)
+    encode_observed(frame, path, &Unobserved)
+}
+
+/// As [`encode`]; the observer is asked before each block of lines whether to stop.
+///
+/// # Errors
+/// As [`encode`]; [`MediaError::Cancelled`].
+pub fn encode_observed(frame: &Frame, path: &Path, observer: &dyn Observer) -> Result<Vec<u8>, MediaError> {
+    encode_with(frame, FileColors::Acescg, path, observer)
 }
 
 /// As [`encode`], of a file whose red, green and blue are no colors, such as motion or opacity: it has no chromaticities, and its `colorInteropID` is
@@ -44,14 +55,14 @@ pub fn encode(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
 /// # Errors
 /// As [`encode`].
 pub fn encode_data(frame: &Frame, path: &Path) -> Result<Vec<u8>, MediaError> {
-    encode_with(frame, FileColors::Data, path)
+    encode_with(frame, FileColors::Data, path, &Unobserved)
 }
 
-fn encode_with(frame: &Frame, colors: FileColors, path: &Path) -> Result<Vec<u8>, MediaError> {
+fn encode_with(frame: &Frame, colors: FileColors, path: &Path, observer: &dyn Observer) -> Result<Vec<u8>, MediaError> {
     let planes = planes(frame);
     check_planes(frame, &planes, path)?;
     let (data, display) = windows(frame, path)?;
-    let blocks = compressed_blocks(frame, &planes, path)?;
+    let blocks = compressed_blocks(frame, &planes, path, observer)?;
     let channels: Vec<ChannelDeclaration> =
         planes.iter().map(|plane| ChannelDeclaration { name: &plane.name, precision: plane.precision }).collect();
     let EncodedHeader { bytes: mut file, digest_at } =
@@ -114,13 +125,19 @@ fn window(origin: [i64; 2], size: [usize; 2]) -> Option<Window> {
     Some(Window { min, max })
 }
 
-fn compressed_blocks(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) -> Result<Vec<Vec<u8>>, MediaError> {
+fn compressed_blocks(
+    frame: &Frame,
+    planes: &[ChannelPlane<'_>],
+    path: &Path,
+    observer: &dyn Observer,
+) -> Result<Vec<Vec<u8>>, MediaError> {
     let (width, height) = (frame.beauty.width(), frame.beauty.height());
     let header = crate_header(planes, width, height);
     let bytes_per_line = width * planes.iter().map(ChannelPlane::bytes_per_value).sum::<usize>();
     (0..height.div_ceil(LINES_PER_BLOCK))
         .into_par_iter()
         .map(|index| {
+            check(observer)?;
             let lines = index * LINES_PER_BLOCK..((index + 1) * LINES_PER_BLOCK).min(height);
             let (mut bytes, mut row) = (Vec::with_capacity(bytes_per_line * lines.len()), PlaneRow::default());
             // Line by line, and in each all values of a channel together.
@@ -128,10 +145,10 @@ fn compressed_blocks(frame: &Frame, planes: &[ChannelPlane<'_>], path: &Path) ->
                 planes.iter().for_each(|plane| plane.append(line * width..(line + 1) * width, &mut row, &mut bytes));
             }
             let section = IntegerBounds::new(Vec2(0, lines.start as i32), Vec2(width, lines.len()));
-            header.compression.compress_image_section_to_le(&header, bytes, section)
+            let compressed = header.compression.compress_image_section_to_le(&header, bytes, section);
+            compressed.map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
         })
-        .collect::<Result<_, _>>()
-        .map_err(|error| MediaError::Encode { path: path.to_path_buf(), reason: error.to_string() })
+        .collect()
 }
 
 /// The header that the crate needs to compress a block.
@@ -249,10 +266,30 @@ struct PlaneRow {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use bansho_base::{camera::Lens, frame::Channel};
 
     use super::*;
     use crate::testing;
+
+    /// Asks to stop once it was asked this many times.
+    struct StopsAfter(AtomicUsize);
+
+    impl Observer for StopsAfter {
+        fn cancelled(&self) -> bool {
+            self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_err()
+        }
+    }
+
+    #[test]
+    fn the_observer_stops_it_between_blocks_of_lines() {
+        // Six blocks.
+        let frame = testing::frame(50, 90);
+        let encoded = |times| encode_observed(&frame, Path::new("a.exr"), &StopsAfter(AtomicUsize::new(times)));
+        assert!(matches!(encoded(5), Err(MediaError::Cancelled(_))));
+        assert_eq!(encoded(6).unwrap(), encode(&frame, Path::new("a.exr")).unwrap());
+    }
 
     #[test]
     fn the_same_frame_is_the_same_bytes_whatever_the_threads() {

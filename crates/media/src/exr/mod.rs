@@ -4,7 +4,7 @@ pub(crate) mod decode;
 mod encode;
 pub(crate) mod header;
 
-pub use encode::{encode, encode_data};
+pub use encode::{encode, encode_data, encode_observed};
 
 /// Header attribute (string): the name of the color space ("Color Space Encodings", Color Interop Forum, 2024).
 pub const KEY_COLOR_SPACE: &str = "colorInteropID";

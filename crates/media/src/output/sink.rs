@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use bansho_base::{
     color::AlphaConvention,
     frame::{DisplayEncoding, DisplayImage, DisplayPixels, Frame},
+    host::observer::{Observer, Unobserved},
 };
 
 use crate::{
@@ -190,17 +191,25 @@ impl Sink {
     /// # Errors
     /// The frame cannot be written or would replace a file that must stay, has the wrong pixel format or size, or is out of order.
     pub fn write(&self, slot: FrameSlot, picture: FinishedPicture<'_>) -> Result<(), MediaError> {
-        self.commit(self.encode(slot, picture)?)
+        self.commit(self.encode(slot, picture, &Unobserved)?)
     }
 
     /// Encodes a frame and writes nothing: most of the work of [`write`](Self::write), in any order.
     ///
     /// # Errors
-    /// The frame has the wrong pixel format or size, or its format cannot hold it.
-    pub fn encode(&self, slot: FrameSlot, picture: FinishedPicture<'_>) -> Result<EncodedFrame, MediaError> {
+    /// The frame has the wrong pixel format or size, or its format cannot hold it; [`MediaError::Cancelled`] if the observer stops the compression of an EXR
+    /// file, which takes long.
+    pub fn encode(
+        &self,
+        slot: FrameSlot,
+        picture: FinishedPicture<'_>,
+        observer: &dyn Observer,
+    ) -> Result<EncodedFrame, MediaError> {
         let path = self.path(slot.number);
         let bytes = match (&self.target, picture) {
-            (SinkTarget::Exr, FinishedPicture::Linear(frame)) => EncodedBytes::File(exr::encode(frame, &path)?),
+            (SinkTarget::Exr, FinishedPicture::Linear(frame)) => {
+                EncodedBytes::File(exr::encode_observed(frame, &path, observer)?)
+            }
             (SinkTarget::Png, FinishedPicture::Display(image, fingerprint)) => {
                 EncodedBytes::File(png::encode(image, fingerprint, self.options.png_effort, &path)?)
             }

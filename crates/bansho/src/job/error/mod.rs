@@ -84,7 +84,7 @@ pub enum JobError {
     Render(RenderError),
     /// Writing failed.
     #[error(transparent)]
-    Media(#[from] MediaError),
+    Media(MediaError),
     /// Finished frames were removed or changed before the job ended.
     #[error(
         "{files}: {} missing, or changed after this job wrote {}",
@@ -151,6 +151,15 @@ fn it_or_them(count: usize) -> &'static str {
 
 fn did_you_mean(suggestion: &Option<PathBuf>) -> String {
     suggestion.as_ref().map(|path| format!(", did you mean `{}`?", path.display())).unwrap_or_default()
+}
+
+impl From<MediaError> for JobError {
+    fn from(error: MediaError) -> Self {
+        match error {
+            MediaError::Cancelled(Cancelled) => Self::Cancelled,
+            other => Self::Media(other),
+        }
+    }
 }
 
 impl From<RenderError> for JobError {

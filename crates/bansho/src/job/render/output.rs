@@ -97,7 +97,7 @@ impl Format {
         let number = header.number;
         let metadata = self.metadata.then(|| metadata::text(frame.header(), frame.metadata(), &sink.path(number)));
         let _stage = StageGuard::begin(observer, Stage::Write);
-        let picture = sink.encode(FrameSlot { index, number }, frame.picture())?;
+        let picture = sink.encode(FrameSlot { index, number }, frame.picture(), observer)?;
         Ok(EncodedPicture { number, metadata, picture })
     }
 

@@ -78,7 +78,10 @@ pub fn apply(text: &str, operations: &[Operation]) -> Result<String, EditError> 
 
 fn apply_operation(root: &mut Table, operation: &Operation) -> Result<(), EditError> {
     match operation {
-        Operation::Set { path, value } => set(root, path, to_toml(value)?),
+        Operation::Set { path, value } => match (path.segments(), value) {
+            ([Segment::Key(key)], Value::Table(values)) => set_root_table(root, key, values),
+            _ => set(root, path, to_toml(value)?),
+        },
         Operation::Remove { path } => remove(root, path),
         Operation::Append { path, value } => append(root, path, value),
         Operation::SetKeyframe { path, time, value } => set_keyframe(root, path, *time, &to_toml(value)?),
@@ -200,6 +203,17 @@ fn set(root: &mut Table, path: &ValuePath, value: TomlValue) -> Result<(), EditE
             }
         }
     }
+    Ok(())
+}
+
+/// Sets a table of the scene itself, which has a header, in its place and below its comments if there is one already.
+fn set_root_table(root: &mut Table, key: &str, values: &Values) -> Result<(), EditError> {
+    let mut table = header_table(values)?;
+    if let Some(Item::Table(old)) = root.get(key) {
+        table.set_position(old.position());
+        *table.decor_mut() = old.decor().clone();
+    }
+    root.insert(key, Item::Table(table));
     Ok(())
 }
 

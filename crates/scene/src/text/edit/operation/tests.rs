@@ -72,6 +72,16 @@ fn missing_tables_are_created() {
 }
 
 #[test]
+fn a_table_of_the_scene_gets_a_header_also_if_it_is_empty_and_stays_in_its_place() {
+    let text = apply(SCENE, &[set_to("fog", Value::Table(Values::default()))]).unwrap();
+    assert_eq!(text, format!("{SCENE}\n[fog]\n"));
+    let mut wind = Values::default();
+    wind.push("gust", Value::Number(0.5));
+    let text = apply(SCENE, &[set_to("wind", Value::Table(wind))]).unwrap();
+    assert!(text.contains("bansho = 2\n\n[wind] # from the left\ngust = 0.5\n\n[[flame_sheet]]"), "{text}");
+}
+
+#[test]
 fn removing_a_value_keeps_everything_else() {
     let text = apply(SCENE, &[Operation::Remove { path: at("flame_sheet.0") }]).unwrap();
     assert!(!text.contains("left log") && text.contains("# behind it") && text.contains("# from the left"), "{text}");
