@@ -25,7 +25,7 @@ use bansho_render::{
 use bansho_scene::{Scene, SceneOptions};
 use rayon::prelude::*;
 
-/// Default of `BANSHO_RANDOM_SCENES`, which is larger in `.ci/run` and `.ci/long`.
+/// Default of `BANSHO_RANDOM_SCENES`, which is larger in `.ci/long`.
 const SCENES: u64 = 250;
 
 #[test]
