@@ -163,7 +163,7 @@ def test_threads_draw_other_frames_during_an_iteration(scene):
 
 
 def test_other_threads_run_while_frames_are_waited_for(scene):
-    shot, counted, is_done = bansho.open(scene, size=(640, 360), threads=2), [0], threading.Event()
+    shot, counted, is_done = bansho.open(scene, size=(1280, 720), threads=2), [0], threading.Event()
 
     def count():
         while not is_done.is_set():

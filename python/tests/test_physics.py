@@ -11,6 +11,9 @@ import pytest
 import bansho
 from bansho import plot
 
+# Its name before numpy 2.
+trapezoid = getattr(np, "trapezoid", None) or np.trapz
+
 DATA = Path(__file__).parents[2] / "crates" / "cli" / "src" / "plot" / "data"
 
 
@@ -59,7 +62,7 @@ def test_auroral_light_peaks_where_electrons_stop():
     green = light.rate[:, abs(light.wavelength_nm - 557.7) < 0.5][:, 0]
     assert 105 < light.altitude_km[green.argmax()] < 135
     # 1 kR is 1e13 photons/(m^2 s) from a column.
-    column = np.trapezoid(green, 1e3 * light.altitude_km) / bansho._bansho.PHOTONS_PER_KILORAYLEIGH
+    column = trapezoid(green, 1e3 * light.altitude_km) / bansho._bansho.PHOTONS_PER_KILORAYLEIGH
     assert column == pytest.approx(light.kilorayleigh[abs(light.wavelength_nm - 557.7) < 0.5][0], rel=0.01)
     for energy, altitude, rate in rows_of("fang2010_peaks.csv"):
         altitudes, rates = bansho.aurora_deposition(1e3 * energy, spectrum="monoenergetic")

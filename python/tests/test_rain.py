@@ -9,6 +9,9 @@ import pytest
 
 import bansho
 
+# Its name before numpy 2.
+trapezoid = getattr(np, "trapezoid", None) or np.trapz
+
 PLATES = Path(__file__).parents[2] / "scenes" / "plates"
 K = np.array([[400.0, 0.0, 159.5], [0.0, 400.0, 89.5], [0.0, 0.0, 1.0]])
 
@@ -22,7 +25,7 @@ def test_attenuation_follows_the_rain_rate():
     diameters = np.linspace(0, 20, 200_001)
     for rate in (2.0, 10.0, 50.0, 100.0):
         density = 8000 * np.exp(-4.1 * rate**-0.21 * diameters)
-        beta = np.trapezoid(density * np.pi / 4 * (1e-3 * diameters) ** 2, diameters)
+        beta = trapezoid(density * np.pi / 4 * (1e-3 * diameters) ** 2, diameters)
         for distance in (50.0, 200.0):
             depth = np.full((180, 320), distance, np.float32)
             _, truth = bansho.rain(flat(), depth, rate_mm_per_h=rate, camera=K, depth_kind="distance", truth=True, strength="physical")

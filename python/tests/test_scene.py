@@ -113,6 +113,8 @@ def test_tables_and_values_that_are_stated_are_in_a_scene():
     assert list(scene) == ["bansho", "fog", "rain"]
     assert all(path in scene for path in ("fog", "fog.visibility_m", "rain", "rain.0.splashes.fraction", "rain.1.name"))
     assert not any(path in scene for path in ("camera", "fog.visibility", "rain.2", "rain.1.splashes", "rain.0.splashes.fraction.x"))
+    scene["rain.0.diameters_mm"] = [0.5]
+    assert "rain.0.diameters_mm.0" in scene and not any(path in scene for path in ("rain.0.diameters_mm.1", "rain.0.diameters_mm.x"))
     scene.add(bansho.Camera())
     del scene["rain.1"]
     assert "camera" in scene and "rain.splashes" in scene

@@ -116,11 +116,11 @@ class Box:
 
 def boxes(mask: NDArray[np.bool_], *, min_area: int = 1) -> list[Box]:
     """The bounding boxes of the connected parts (also over corners) of a mask, the largest part first."""
-    return [box for box, _ in _parts(_arrays.as_numpy(mask, "mask"), min_area)]
+    return [box for box, _ in _parts(mask, min_area)]
 
 
-def _plane_of(mask: Any) -> NDArray[np.bool_]:
-    """A mask as an array."""
+def _checked(mask: Any) -> NDArray[np.bool_]:
+    """A mask as an array (height, width) of truth values."""
     array = _arrays.as_numpy(mask, "mask")
     if array.ndim != 2:
         raise ValueError(f"mask: an array of shape {array.shape}; allowed: (height, width)")
@@ -129,7 +129,7 @@ def _plane_of(mask: Any) -> NDArray[np.bool_]:
 
 def _parts(mask: NDArray[np.bool_], min_area: int) -> list[tuple[Box, NDArray[np.int64]]]:
     """The connected parts of a mask, the largest first, each with its runs."""
-    mask = _plane_of(mask)
+    mask = _checked(mask)
     runs = _runs(mask)
     if len(runs) == 0:
         return []
@@ -182,7 +182,7 @@ def _connected(runs: NDArray[np.int64], height: int) -> NDArray[np.int64]:
 
 def rle(mask: NDArray[np.bool_]) -> dict[str, Any]:
     """A mask as the uncompressed run lengths of COCO: counts of 0 and 1 in turn, column after column."""
-    mask = _plane_of(mask)
+    mask = _checked(mask)
     values = mask.astype(np.int8).ravel(order="F")
     ends = np.flatnonzero(np.diff(values)) + 1
     counts = np.diff(np.concatenate([[0], ends, [values.size]])).tolist()
@@ -203,7 +203,7 @@ def coco(masks: Iterable[tuple[str, Mapping[str, NDArray[np.bool_]]]], categorie
         for category, part in by_category.items():
             if category not in categories:
                 raise ValueError(f"category: {category!r}; allowed: {', '.join(map(repr, categories))}")
-            part = _plane_of(part)
+            part = _checked(part)
             for box, runs in _parts(part, min_area):
                 within = np.zeros_like(part)
                 for row, start, end in runs.tolist():
@@ -219,7 +219,7 @@ def coco(masks: Iterable[tuple[str, Mapping[str, NDArray[np.bool_]]]], categorie
                         "segmentation": rle(within),
                     }
                 )
-        height, width = _plane_of(next(iter(by_category.values()))).shape
+        height, width = _checked(next(iter(by_category.values()))).shape
         images.append({"id": number, "file_name": name, "width": width, "height": height})
     listed = [{"id": index, "name": category} for index, category in enumerate(categories, start=1)]
     return {"images": images, "annotations": annotations, "categories": listed}
@@ -231,7 +231,7 @@ def yolo(masks: Mapping[str, NDArray[np.bool_]], categories: Sequence[str] = ("f
     for category, part in masks.items():
         if category not in categories:
             raise ValueError(f"category: {category!r}; allowed: {', '.join(map(repr, categories))}")
-        part = _plane_of(part)
+        part = _checked(part)
         height, width = part.shape
         for box in boxes(part, min_area=min_area):
             x, y = (box.x + 0.5 * box.width) / width, (box.y + 0.5 * box.height) / height

@@ -89,18 +89,19 @@ class Scene:
         """Whether the text states a value, or has a table, at a dotted path."""
         value: Any = self.to_dict()
         for part in str(path).split("."):
-            if isinstance(value, list) and len(value) == 1 and not part.isdecimal() and value[0].get("name") != part:
-                value = value[0]
             if isinstance(value, list):
-                named = [item for item in value if isinstance(item, dict) and item.get("name") == part]
-                index = int(part) if part.isdecimal() else len(value)
-                if not named and index >= len(value):
+                selected = [item for item in value if isinstance(item, dict) and item.get("name") == part]
+                if not selected and part.isdecimal():
+                    selected = value[int(part) :]
+                if selected:
+                    value = selected[0]
+                    continue
+                if len(value) != 1 or part.isdecimal():
                     return False
-                value = named[0] if named else value[index]
-            elif isinstance(value, dict) and part in value:
-                value = value[part]
-            else:
+                value = value[0]
+            if not isinstance(value, dict) or part not in value:
                 return False
+            value = value[part]
         return True
 
     def __iter__(self) -> Iterator[str]:

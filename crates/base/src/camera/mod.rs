@@ -98,9 +98,9 @@ impl CameraParameters {
     /// Whether the camera is the same at all times.
     #[must_use]
     pub fn is_constant(&self) -> bool {
-        let is_still = [&self.position, &self.target, &self.up].iter().all(|vector| vector.constant().is_some());
-        let zooms = self.focal_length_mm.as_ref().unwrap_or(&self.vertical_fov_deg).constant().is_none();
-        is_still && self.roll_deg.constant().is_some() && !zooms
+        let field_of_view = self.focal_length_mm.as_ref().unwrap_or(&self.vertical_fov_deg);
+        [&self.position, &self.target, &self.up].iter().all(|vector| vector.constant().is_some())
+            && [&self.roll_deg, field_of_view].iter().all(|number| number.constant().is_some())
     }
 
     /// The camera as an exposure with its middle at `middle` (s) sees it, in frames of `frame_s` seconds: on one side of every cut, which is no motion. See

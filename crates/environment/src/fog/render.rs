@@ -20,7 +20,7 @@ use fearless_simd::{Level, dispatch};
 
 use super::{
     light_in_fog::{LightInFog, Segments},
-    row_cache::{FogBatch, FogCache, FogInputs, FogRows, KeptBatch, SliceRows},
+    row_cache::{CachedBatch, ENDLESS, FogBatch, FogCache, FogInputs, FogRows, SliceRows},
 };
 use crate::ground::height_of_level_ground;
 
@@ -42,8 +42,6 @@ pub(super) struct PreparedFog<'a> {
 
 /// Optical depth behind which nothing is seen: 1e-9 of the light is left.
 const OPAQUE: f32 = 20.0;
-/// Fog has no depth of its own.
-const NO_DEPTH: [f32; LANES] = [f32::INFINITY; LANES];
 
 impl<'a> PreparedFog<'a> {
     pub(super) fn new(extinction: f64, view: &'a View, surroundings: &Surroundings, cache: &FogCache) -> Self {
@@ -153,24 +151,24 @@ impl<'a> PreparedFog<'a> {
         let known_row = cached.and_then(|row| row.get());
         let mut new_row = Vec::new();
         for (index, x) in (rect.x / LANES * LANES..rect.right()).step_by(LANES).enumerate() {
-            let kept = known_row.map(|row| &row[index]);
-            if kept.is_some_and(KeptBatch::is_empty) {
+            let cached_batch = known_row.map(|row| &row[index]);
+            if cached_batch.is_some_and(CachedBatch::is_empty) {
                 continue;
             }
             let drawn = x.max(rect.x)..(x + LANES).min(rect.right());
             let first = (y - rect.y) * rect.width + drawn.start - rect.x;
-            let mut plate = NO_DEPTH;
+            let mut plate = ENDLESS;
             for column in drawn.clone() {
                 plate[column - x] = strip.plate_depth(first + column - drawn.start);
             }
             let part = drawn.start - x..drawn.end - x;
-            let known = kept.and_then(|kept| kept.up_to(&plate));
+            let known = cached_batch.and_then(|batch| batch.up_to(&plate));
             let computed = if known.is_none() { Some(self.batch([x, y], slice, &plate)) } else { None };
             let Some(FogBatch { light, opacity }) = known.or(computed.as_ref()) else { continue };
             let [red, green, blue] = light.each_ref().map(|plane| &plane[part.clone()]);
-            strip.add_row_behind(first, [red, green, blue], Some(&opacity[part.clone()]), &NO_DEPTH[part]);
+            strip.add_row_behind(first, [red, green, blue], Some(&opacity[part.clone()]), &ENDLESS[part]);
             if let (Some(_), None, Some(batch)) = (cached, known_row, computed) {
-                new_row.push(KeptBatch::new(batch, &plate));
+                new_row.push(CachedBatch::new(batch, &plate));
             }
         }
         if let (Some(row), None) = (cached, known_row) {

@@ -38,7 +38,7 @@ pub(super) struct FogBatch {
 
 /// What is kept of the fog of sixteen pixels in a slice.
 #[derive(Clone, Debug)]
-pub(super) enum KeptBatch {
+pub(super) enum CachedBatch {
     /// There is none, wherever plate or solids end the lines of sight.
     Empty,
     /// Nothing, since it is found as fast again.
@@ -49,7 +49,7 @@ pub(super) enum KeptBatch {
     UpTo(Box<(LaneArray, FogBatch)>),
 }
 
-impl KeptBatch {
+impl CachedBatch {
     /// Keeps fog up to depths `plate`.
     pub(super) fn new(batch: FogBatch, plate: &LaneArray) -> Self {
         let is_seen = batch.opacity.iter().any(|opacity| *opacity > 0.0);
@@ -77,11 +77,11 @@ impl KeptBatch {
     }
 }
 
-/// The depths of lines of sight that nothing ends.
-const ENDLESS: LaneArray = [f32::INFINITY; LANES];
+/// The depths of lines of sight that nothing ends, and that of fog itself.
+pub(super) const ENDLESS: LaneArray = [f32::INFINITY; LANES];
 
 /// A row in batches of sixteen pixels.
-pub(super) type Row = Vec<KeptBatch>;
+pub(super) type Row = Vec<CachedBatch>;
 
 /// The rows of a slice, each computed by the first strip that draws the whole of it.
 #[derive(Debug)]
@@ -221,15 +221,15 @@ mod tests {
     fn a_batch_is_used_only_where_the_lines_of_sight_end_as_before() {
         let batch = FogBatch { light: [[0.5; LANES]; 3], opacity: [0.25; LANES] };
         let mut plate = ENDLESS;
-        let endless = KeptBatch::new(batch.clone(), &plate);
+        let endless = CachedBatch::new(batch.clone(), &plate);
         assert_eq!(endless.up_to(&plate), Some(&batch));
         plate[3] = 8.0;
         assert_eq!(endless.up_to(&plate), None);
-        let ended = KeptBatch::new(batch.clone(), &plate);
+        let ended = CachedBatch::new(batch.clone(), &plate);
         assert_eq!((ended.up_to(&plate), ended.up_to(&ENDLESS)), (Some(&batch), None));
         let none = FogBatch { opacity: [0.0; LANES], ..batch };
-        assert!(!KeptBatch::new(none.clone(), &plate).is_empty(), "what ended it may move away");
-        assert!(KeptBatch::new(none, &ENDLESS).is_empty());
+        assert!(!CachedBatch::new(none.clone(), &plate).is_empty(), "what ended it may move away");
+        assert!(CachedBatch::new(none, &ENDLESS).is_empty());
     }
 
     #[test]

@@ -37,7 +37,7 @@ impl Shadows<'_> {
 
     /// The sides of the part of the ground that a pixel shows, m: across the line of sight, and along it.
     fn pixel_sides(&self, lane: usize) -> [DVec3; 2] {
-        /// Least sine of the angle between line of sight and ground: nearer to the horizon, pixels show more than shadows are long.
+        /// Least sine of the angle between line of sight and ground. Nearer to the horizon a pixel is longer than most shadows.
         const LEAST_SINE: f64 = 0.02;
         let line = DVec3::from([0, 1, 2].map(|axis| f64::from(self.points[axis][lane])));
         let distance = line.length();
