@@ -189,6 +189,7 @@ fn min_interval_density(simulation: &AuroraSimulation, shape: &Shape) -> f64 {
 }
 
 #[test]
+#[ignore = "statistics of half a minute or more: .ci/long runs them"]
 fn every_interval_of_the_thesis_scenes_has_its_share_of_particles_on_arrival() {
     for scene in 1..=5 {
         let sequence = sequence(scene);

@@ -281,7 +281,7 @@ const PHENOMENA: &[Phenomenon] = &[
         name: "aurora",
         shutter_s: USUAL_S,
         tables: |_| {
-            "shift = [0.0, 1.2]\n[[aurora]]\nparticles = { count = 5000 }\n[sky]\nkind = \"night\"\nnight = { stars = 0 }\n".to_owned()
+            "shift = [0.0, 1.2]\n[[aurora]]\npreroll_s = 1\nparticles = { count = 5000 }\n[sky]\nkind = \"night\"\nnight = { stars = 0 }\n".to_owned()
         },
         carried: None,
         cameras: TURNS,

@@ -99,6 +99,7 @@ fn usual_collision_deflection() -> f64 {
 }
 
 #[test]
+#[ignore = "statistics of half a minute or more: .ci/long runs them"]
 fn the_mean_of_many_collision_pictures_is_the_profile() {
     for (seed, collision_deflection) in [
         (5, usual_collision_deflection()),

@@ -35,6 +35,7 @@ fn moment(simulation: &AuroraSimulation, target: &Shape) -> Moment {
 }
 
 #[test]
+#[ignore = "statistics of half a minute or more: .ci/long runs them"]
 fn after_a_transition_particles_lie_on_the_target_and_everywhere_along_it() {
     // A turn of the spiral lies 12 km from the next: sheets of 9 km, as on the coarse grid, would be one.
     for (name, cells, shapes) in [
@@ -118,6 +119,7 @@ fn min_interval_density(simulation: &AuroraSimulation) -> f64 {
 
 /// With default particles, cells and folds, from the arrival on.
 #[test]
+#[ignore = "statistics of half a minute or more: .ci/long runs them"]
 fn every_interval_has_its_share_of_particles_from_the_arrival_on() {
     for (name, sheet) in
         [("an S with bends of 4 km", narrow_s()), ("fold", form(Form::Fold)), ("peel", form(Form::Peel))]
@@ -265,6 +267,7 @@ fn contrast_along(kernel: RepulsionKernel, particles: i64) -> f64 {
 /// The thesis's reason to choose a kernel. It holds while particles are few; with as many as scenes have the field's noise, which is the same
 /// for both, makes the pattern of that width.
 #[test]
+#[ignore = "statistics of half a minute or more: .ci/long runs them"]
 fn rays_have_more_contrast_with_the_spline_while_particles_are_few() {
     let of = |particles: i64| {
         [RepulsionKernel::CubicSpline, RepulsionKernel::Poly6Spiky].map(|kernel| contrast_along(kernel, particles))

@@ -2,7 +2,7 @@
 //! second. Frames are drawn to memory and converted for display; nothing is written.
 //!
 //! ```text
-//! cargo bench -p bansho --bench scenes -- [SCENE...] [--frames N] [--size WxH] [--dome-size N] [--threads N] [--json FILE]
+//! cargo bench -p bansho-cli --bench scenes -- [SCENE...] [--frames N] [--size WxH] [--dome-size N] [--threads N] [--json FILE]
 //!                                         [--check FILE] [--record FILE]
 //! ```
 //!

@@ -40,7 +40,7 @@ pub(crate) fn text(ratios: &[Ratio], arguments: &Arguments) -> String {
     let mut text = format!(
         "# scene | still camera | panning camera: the time of a frame over the geometric mean of all scenes; for all scenes, that mean over the\n\
          # reference kernel. The check fails above {CEILING} times these numbers. Recorded by\n\
-         # cargo bench -p bansho --bench scenes -- --size {width}x{height} --dome-size {dome} --frames {frames} --record .ci/scene_ratios.txt\n\n"
+         # cargo bench -p bansho-cli --bench scenes -- --size {width}x{height} --dome-size {dome} --frames {frames} --record .ci/scene_ratios.txt\n\n"
     );
     for Ratio { name, still, pan } in ratios {
         // Writing to a string cannot fail.

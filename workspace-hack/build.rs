@@ -1,0 +1,3 @@
+//! Cargo resolves build dependencies only for crates that have a build script.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Nothing: the dependencies of this crate are what it is for.
