@@ -2,6 +2,7 @@
 
 import io
 import os
+import pickle
 import struct
 import subprocess
 import sys
@@ -159,6 +160,9 @@ def test_the_camera_projects_drops_to_their_streaks():
 def test_data_of_a_frame(shot):
     frame = shot.render(0)
     assert frame.aovs["flame_sheet.temperature_k"].unit == "K" and "temperature" in frame.aovs["flame_sheet.temperature_k"].doc
+    aov = frame.aovs["flame_sheet.temperature_k"]
+    sent = pickle.loads(pickle.dumps(aov[:5]))
+    assert (sent.unit, sent.doc) == (aov.unit, aov.doc) and np.array_equal(sent, aov[:5]), "what a worker process returns keeps its unit"
     assert {figure.phenomenon for figure in frame.figures} >= {"rain"}
     lights = frame.lights
     assert lights and all(light.phenomenon == "flame_sheet" and light.kind == "point" and light.intensity > 0 for light in lights)
@@ -271,6 +275,13 @@ def test_a_bar_of_tqdm_shows_the_progress(torch_scene, tmp_path, monkeypatch):
     assert len(list(shot.frames(progress=True))) == 4
     shot.write(tmp_path / "f.####.png", frames=[0, 2], progress=True)
     assert [(bar.n, bar.total, bar.unit, bar.disable) for bar in bars] == [(4, 4, "frame", True), (2, 2, "frame", True)], "full and closed"
+    bars.clear()
+    for in_flight in (1, 2):
+        frames = shot.frames(progress=True, frames_in_flight=in_flight)
+        next(frames)
+        next(frames)
+        frames.close()
+    assert [(bar.n, bar.disable) for bar in bars] == [(1, True), (1, True)], "closed where the loop over the frames ends early"
 
 
 def test_without_tqdm_frames_are_drawn_all_the_same(torch_scene, monkeypatch):

@@ -252,6 +252,7 @@ def test_fog_has_the_contrast_of_koschmieder():
         ({"depth": np.ones((180, 320), np.uint16)}, "depth: an array of uint16 without depth_scale; allowed: depth_scale in meters"),
         ({"depth": np.ones((180, 320)), "depth_kind": "inverse"}, "an inverse depth without depth_scale"),
         ({"depth": np.ones((180, 320)), "depth_kind": "disparity"}, "depth_kind: 'disparity'; allowed: \"axis\""),
+        ({"depth_kind": "disparity"}, "depth_kind: 'disparity'; allowed: \"axis\""),
         ({"camera": np.eye(4)}, r"camera: an array of shape \(4, 4\); allowed: a matrix K"),
         ({"camera": np.diag([-400.0, 400, 1])}, "is no camera; allowed: a matrix K"),
         ({"camera": np.diag([400.0, 300, 1])}, "focal lengths of 400 and 300 pixels; allowed: equal ones"),

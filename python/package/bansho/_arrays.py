@@ -66,8 +66,15 @@ def depth_plane(array: NDArray[Any], is_scaled: bool, name: str) -> NDArray[np.f
     return np.ascontiguousarray(plane, dtype=np.float32)
 
 
+def check_depth_kind(kind: Any) -> None:
+    """Refuses what is no kind of depth."""
+    if kind not in ("axis", "distance", "inverse"):
+        raise ValueError(f'depth_kind: {kind!r}; allowed: "axis", "distance", "inverse"')
+
+
 def depth(array: Any, size: tuple[int, int], kind: str, scale: float | None, name: str = "depth") -> NDArray[np.float32]:
     """A depth as floats. Integers, and inverse depths, need a scale."""
+    check_depth_kind(kind)
     values = as_numpy(array, name)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
@@ -77,8 +84,6 @@ def depth(array: Any, size: tuple[int, int], kind: str, scale: float | None, nam
         raise ValueError(f"{name}: {values.shape[0]} x {values.shape[1]} pixels have another shape than the image, {size[0]} x {size[1]}; allowed: the image's aspect ratio")
     if scale is not None:
         scale = _checks.number(scale, "depth_scale", "a number of meters for each unit of the depth, or None")
-    if kind not in ("axis", "distance", "inverse"):
-        raise ValueError(f'depth_kind: {kind!r}; allowed: "axis", "distance", "inverse"')
     if np.issubdtype(values.dtype, np.integer):
         if scale is None:
             raise ValueError(f"{name}: an array of {values.dtype} without depth_scale; allowed: depth_scale in meters for each unit, such as 0.001 for millimeters")

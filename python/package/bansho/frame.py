@@ -37,6 +37,10 @@ class Aov(np.ndarray):  # type: ignore[type-arg]
         self.unit = getattr(source, "unit", "")
         self.doc = getattr(source, "doc", "")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """An array that is pickled keeps what it measures, for instance on its way from a worker process."""
+        return Aov, (np.asarray(self), self.unit, self.doc)
+
 
 AnyArray = TypeVar("AnyArray", bound="NDArray[Any]")
 
@@ -136,6 +140,12 @@ class FrameLight:
     """Factor of the color: candela, of a directional light lux."""
     acescg: tuple[float, float, float]
     """Color times intensity in ACEScg."""
+
+
+def _light(values: Mapping[str, Any]) -> FrameLight:
+    """The light of what the compiled part says about it: its vectors are lists."""
+    fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+    return FrameLight(**fields)
 
 
 def structured(columns: Mapping[str, tuple[NDArray[Any], str]]) -> NDArray[Any]:
@@ -247,10 +257,7 @@ class Frame:
     @property
     def lights(self) -> list[FrameLight]:
         """The lights with which phenomena light each other: of a flame the points that approximate its emission."""
-        return [
-            FrameLight(**{key: tuple(value) if isinstance(value, list) else value for key, value in light.items()})
-            for light in self._shot._shot.lights(self.number)
-        ]
+        return [_light(values) for values in self._shot._shot.lights(self.number)]
 
     def _repr_png_(self) -> bytes:
         return _png.encode(self.display(alpha="encoded"))

@@ -182,13 +182,14 @@ class Effect:
     @property
     def size(self) -> tuple[int, int]:
         """Width and height, pixels."""
-        return tuple(self._effect.size)
+        width, height = self._effect.size
+        return width, height
 
     @property
     def wind(self) -> tuple[tuple[float, float, float], float]:
         """Mean wind at the current time, m/s, and its turbulence intensity."""
-        velocity, gust = self._effect.wind
-        return tuple(velocity), gust
+        (x, y, z), gust = self._effect.wind
+        return (x, y, z), gust
 
     @property
     def is_simulated(self) -> bool:

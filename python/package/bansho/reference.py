@@ -90,7 +90,7 @@ def _arguments(function: Any) -> list[str]:
         if parameter.kind is inspect.Parameter.KEYWORD_ONLY and not is_keyword_only:
             arguments.append("*")
         is_keyword_only |= parameter.kind in (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_POSITIONAL)
-        stars = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}.get(parameter.kind, "")
+        stars = "*" * (parameter.kind is inspect.Parameter.VAR_POSITIONAL) + "**" * (parameter.kind is inspect.Parameter.VAR_KEYWORD)
         annotated = "" if parameter.annotation is inspect.Parameter.empty else f": {parameter.annotation}"
         default = "" if parameter.default is inspect.Parameter.empty else f" = {_default(parameter.default)}"
         arguments.append(f"{stars}{name}{annotated}{default}")

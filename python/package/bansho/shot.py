@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -162,20 +164,20 @@ class Shot:
 
     def _drawn(self, numbers: range, progress: bool | Progress, in_flight: int) -> Iterator[Frame]:
         """Draws frames, of which `in_flight` at once."""
-        report = _reporter(progress, len(numbers))
-        if in_flight == 1:
-            for done, number in enumerate(numbers, start=1):
-                yield self.render(number)
-                report(done, len(numbers))
-            return
-        stream = self._shot.frame_stream(numbers.start, numbers.step, len(numbers), in_flight)
-        try:
-            for done, drawn in enumerate(stream, start=1):
-                yield Frame(self, drawn, self._space)
-                report(done, len(numbers))
-        finally:
-            # Frames that are drawn ahead are of no use if the iteration ends early.
-            stream.close()
+        with _reporter(progress, len(numbers)) as report:
+            if in_flight == 1:
+                for done, number in enumerate(numbers, start=1):
+                    yield self.render(number)
+                    report(done, len(numbers))
+                return
+            stream = self._shot.frame_stream(numbers.start, numbers.step, len(numbers), in_flight)
+            try:
+                for done, drawn in enumerate(stream, start=1):
+                    yield Frame(self, drawn, self._space)
+                    report(done, len(numbers))
+            finally:
+                # Frames that are drawn ahead are of no use if the iteration ends early.
+                stream.close()
 
     def write(
         self,
@@ -202,21 +204,22 @@ class Shot:
             numbers = [_whole(number) for number in ([frames] if hasattr(frames, "__index__") else frames)]
         begin, stop = self.range
         options = {key: value for key, value in self._options.items() if key not in ("figures", "overscan")}
-        first, remarks = _bansho.write_files(
-            self.scene.to_toml(),
-            self.scene.name,
-            self.scene.folder,
-            Path(out),
-            frames=numbers,
-            metadata=metadata,
-            glare=glare,
-            bits=bits,
-            alpha=alpha,
-            overwrite=overwrite,
-            resume=resume,
-            progress=None if progress is False else _reporter(progress, stop - begin if numbers is None else len(numbers)),
-            **options,
-        )
+        with _reporter(progress, stop - begin if numbers is None else len(numbers)) as report:
+            first, remarks = _bansho.write_files(
+                self.scene.to_toml(),
+                self.scene.name,
+                self.scene.folder,
+                Path(out),
+                frames=numbers,
+                metadata=metadata,
+                glare=glare,
+                bits=bits,
+                alpha=alpha,
+                overwrite=overwrite,
+                resume=resume,
+                progress=None if progress is False else report,
+                **options,
+            )
         for remark in remarks:
             warnings.warn(remark, UserWarning, stacklevel=2)
         return Path(first)
@@ -246,7 +249,8 @@ class Shot:
     @property
     def size(self) -> tuple[int, int]:
         """Width and height, pixels."""
-        return tuple(self._shot.size)
+        width, height = self._shot.size
+        return width, height
 
     @property
     def fps(self) -> float:
@@ -283,22 +287,24 @@ def _whole(number: Any) -> int:
     return _checks.whole(number, "a frame number")
 
 
-def _reporter(progress: bool | Progress, count: int) -> Progress:
-    """What is called with the number of frames that are done and of all."""
+@contextmanager
+def _reporter(progress: bool | Progress, count: int) -> Iterator[Progress]:
+    """What is called with the number of frames that are done and of all. A bar is closed however the work ends."""
     if callable(progress):
-        return progress
-    if progress:
-        try:
-            from tqdm.auto import tqdm
-        except ImportError:
-            return lambda done, total: None
-        bar = tqdm(total=count, unit="frame")
+        yield progress
+        return
+    try:
+        # A library that is missing is found when it is asked for, not by the work within.
+        bar_class = importlib.import_module("tqdm.auto").tqdm if progress else None
+    except ImportError:
+        bar_class = None
+    if bar_class is None:
+        yield lambda done, total: None
+        return
+    with bar_class(total=count, unit="frame") as bar:
 
         def report(done: int, total: int) -> None:
             bar.total = total
             bar.update(done - bar.n)
-            if done >= total:
-                bar.close()
 
-        return report
-    return lambda done, total: None
+        yield report

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _arrays, _bansho, _camera, _checks, _workers
 from .errors import PhysicalStrengthNotice
+from .frame import FrameCamera
 from .scene import Scene
 
 __all__ = ["RainTruth", "augment_strength", "derived_seed", "fog", "rain", "rain_scene", "rain_stereo", "rain_video"]
@@ -151,7 +152,7 @@ def rain_scene(
     size: tuple[int, int],
     *,
     rate_mm_per_h: float = 20.0,
-    camera: ArrayLike | None = None,
+    camera: ArrayLike | FrameCamera | None = None,
     pose: ArrayLike | Sequence[ArrayLike] | None = None,
     exposure_s: float = 1 / 60,
     wind: Sequence[float] = (0.0, 0.0, 0.0),
@@ -181,10 +182,12 @@ def rain_scene(
     exposure = _checks.number(exposure_s, "exposure_s")
     if parameters is not None and not isinstance(parameters, Mapping):
         raise ValueError(f"parameters: {_checks.shortened(parameters)}; allowed: a dict of keys of [[rain]]")
+    _arrays.check_depth_kind(depth_kind)
+    scale = _depth_scale(depth_scale)
     poses = _poses(pose)
     plate: dict[str, Any] = {"image": "image", "depth": "depth" if depth else None, "exposure_ev100": _checks.number(exposure_ev100, "exposure_ev100")}
     if depth:
-        plate |= {"depth_kind": depth_kind, "depth_scale": _depth_scale(depth_scale)}
+        plate |= {"depth_kind": depth_kind, "depth_scale": scale}
     given: dict[str, Any] = {
         "rate_mm_per_h": _checks.number(rate_mm_per_h, "rate_mm_per_h"),
         "method": "drops",
@@ -279,8 +282,8 @@ def rain(
     image: ArrayLike,
     depth: ArrayLike | None = None,
     *,
-    rate_mm_per_h: float | Sequence[float] = 20.0,
-    camera: ArrayLike | None = None,
+    rate_mm_per_h: ArrayLike = 20.0,
+    camera: ArrayLike | FrameCamera | None = None,
     pose: ArrayLike | None = None,
     exposure_s: float = 1 / 60,
     wind: Sequence[float] = (0.0, 0.0, 0.0),
@@ -300,8 +303,8 @@ def rain(
 
     :param image: (H, W, 3 or 4) `uint8` (sRGB) or floats (linear sRGB); or a batch (N, H, W, 3), each of which gets rain of its own.
     :param depth: (H, W) in m, or integers with `depth_scale`; it hides what is behind, and sets how much airlight is in front. `None` for infinitely far.
-    :param rate_mm_per_h: rain rate, 0 to 300: 1 drizzle, 5 rain, 20 heavy, 70 a downpour; of a batch also one for each.
-    :param camera: matrix K (3 x 3, OpenCV) in pixels; `None` for a lens of 28 mm on 24 mm of sensor height.
+    :param rate_mm_per_h: rain rate, 0 to 300: 1 drizzle, 5 rain, 20 heavy, 70 a downpour; of a batch also (N,), one for each.
+    :param camera: matrix K (3 x 3, OpenCV) in pixels, or the camera of a frame; `None` for a lens of 28 mm on 24 mm of sensor height.
     :param pose: 4 x 4, world from camera (right, up, backward; y up; m); `None` for a level camera 1.6 m above the ground.
     :param exposure_s: exposure time, which is how long streaks are.
     :param wind: its velocity in m/s: x to the right, y up, z toward the viewer of a camera that is not rotated.
@@ -391,7 +394,7 @@ def rain_video(
     truth: bool = False,
     threads: int | None = None,
     rate_mm_per_h: float = 20.0,
-    camera: ArrayLike | None = None,
+    camera: ArrayLike | FrameCamera | None = None,
     exposure_s: float | None = None,
     wind: Sequence[float] = (0.0, 0.0, 0.0),
     gust: float = 0.0,
@@ -541,7 +544,7 @@ def fog(
     depth: ArrayLike,
     visibility_m: float = 500.0,
     *,
-    camera: ArrayLike | None = None,
+    camera: ArrayLike | FrameCamera | None = None,
     pose: ArrayLike | None = None,
     depth_kind: DepthKind = "axis",
     depth_scale: float | None = None,
