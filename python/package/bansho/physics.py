@@ -138,7 +138,7 @@ def streaks(
     side, number = _checks.whole(size, "size", "1 to 65536 pixels", 1, 65536), _checks.whole(variant, "variant", "0 or more", 0, 2**32 - 1)
     rate, exposure, edge = (_checks.number(value, name) for value, name in ((rate_mm_per_h, "rate_mm_per_h"), (exposure_s, "exposure_s"), (edge_m, "edge_m")))
     opacity, rows = _bansho.streak_textures(rate, diameters, exposure, edge, side, _checks.seed(seed), number)
-    drops = []
+    drops: list[NDArray[Any]] = []
     for row in rows:
         array = np.zeros(len(row), [("diameter_mm", "f8"), ("speed", "f8"), ("position", "f8", (3,))])
         array["diameter_mm"], array["speed"], array["position"] = row[:, 0], row[:, 1], row[:, 2:]

@@ -52,7 +52,7 @@ def columns(curve: str, *inputs: Scene | str | Path, **options: Any) -> Columns:
 
 def black_body(start_k: float = 1.0, end_k: float = 10_000.0, step_k: float = 1.0) -> Columns:
     """Linear sRGB and ACEScg of luminance 1, and luminance (cd/m^2), by temperature."""
-    kelvins = np.arange(start_k, end_k + 1e-9 * step_k, step_k)
+    kelvins = np.arange(start_k, end_k + 1e-9 * step_k, step_k, dtype=np.float64)
     columns: Columns = {"temperature_k": kelvins}
     for space in ("linear_srgb", "acescg"):
         body = physics.black_body(kelvins, space=space)  # type: ignore[arg-type]
@@ -73,7 +73,7 @@ def drop_sizes(rates_mm_per_h: Sequence[float] = (1.0, 5.0, 20.0, 50.0)) -> Colu
 
 def terminal_velocity() -> Columns:
     """Terminal velocity of drops by diameter, m/s: both laws."""
-    diameters = np.linspace(0, 6, 121)
+    diameters = np.linspace(0, 6, 121, dtype=np.float64)
     return {
         "diameter_mm": diameters,
         "gunn_kinzer_m_per_s": physics.terminal_velocity(diameters),
@@ -83,7 +83,7 @@ def terminal_velocity() -> Columns:
 
 def streak_opacity(exposures_s: Sequence[float] = (1 / 30, 1 / 60, 1 / 250)) -> Columns:
     """Opacity on the axis of streaks by diameter and exposure time."""
-    diameters = np.linspace(0.1, 6, 119)
+    diameters = np.linspace(0.1, 6, 119, dtype=np.float64)
     columns: Columns = {"diameter_mm": diameters}
     for exposure in exposures_s:
         columns[f"opacity_at_{exposure:g}_s"] = physics.streak_opacity(diameters, exposure)
