@@ -28,7 +28,7 @@ import bansho
 
 bansho.rain([[[0, 0, 0]]], rate=20)
 bansho.rain([[[0, 0, 0]]], visibility="more")
-bansho.FlameSheet(widht=0.4)
+bansho.FlameSheet(breadth=0.4)
 bansho.Effect(bansho.FlameSheet()).advance("a second")
 """
 
