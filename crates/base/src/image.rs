@@ -135,6 +135,11 @@ impl Rect {
         Self { x, y, width: self.right().max(other.right()) - x, height: self.bottom().max(other.bottom()) - y }
     }
 
+    /// The smallest rectangle that contains all; without any, an empty one.
+    pub fn hull<'a>(rects: impl IntoIterator<Item = &'a Self>) -> Self {
+        rects.into_iter().fold(Self::default(), |all, rect| all.union(rect))
+    }
+
     /// The intersection of both rectangles.
     pub fn intersection(&self, other: &Self) -> Self {
         let (x, y) = (self.x.max(other.x), self.y.max(other.y));
@@ -171,5 +176,7 @@ mod tests {
         let b = Rect { x: 2, y: 3, width: 9, height: 9 };
         assert_eq!(a.intersection(&b), Rect { x: 2, y: 3, width: 2, height: 1 });
         assert!(a.intersection(&Rect { x: 4, y: 0, width: 1, height: 1 }).is_empty());
+        assert_eq!(Rect::hull([&a, &Rect::default(), &b]), Rect { x: 0, y: 0, width: 11, height: 12 });
+        assert!(Rect::hull([]).is_empty());
     }
 }

@@ -164,12 +164,16 @@ const RENEWALS: (i64, i64) = (6, 3);
 const TRANSITION: i64 = 140;
 const AROUND: i64 = 8;
 
-/// The scenes of the thesis around all their events (all frames if `BANSHO_ALL_FRAMES` is set, as in `.ci/long`), small, with a thirtieth of the particles, and without the sky behind, which would hide
+/// Three scenes of the thesis around all their events (all scenes and frames if `BANSHO_ALL_FRAMES` is set, as in `.ci/long`), small, with a thirtieth of the particles, and without the sky behind, which would hide
 /// what changes.
 #[test]
 fn the_light_of_the_thesis_scenes_never_jumps() {
     let every_frame = std::env::var_os("BANSHO_ALL_FRAMES").is_some();
     for (scene, count) in [(1, 281), (2, 281), (3, 281), (4, 561), (5, 421)] {
+        // Scene 3 has as many events as scene 2, and scene 4 takes a third of the time of all.
+        if !every_frame && [3, 4].contains(&scene) {
+            continue;
+        }
         let text = scene_text(&format!("sekiguchi_{scene}"));
         assert!(text.contains(&format!("frames = {count}")) && text.contains("count = 120_000"), "scene {scene}");
         let text = without_sky(&text).replace("count = 120_000", "count = 4000");

@@ -23,6 +23,22 @@ pub(crate) fn scene_text(scene: &str) -> String {
     std::fs::read_to_string(scenes().join(format!("{scene}.toml"))).unwrap_or_else(|error| panic!("{scene}: {error}"))
 }
 
+fn planned(text: &str, size: [usize; 2], options: &SceneOptions) -> (Arc<CompiledScene>, Arc<Plan>) {
+    let assets = Arc::new(FileAssets::new(scenes()));
+    let scene = bansho::parse_scene("scene", text).unwrap_or_else(|error| panic!("{error}"));
+    let scene = scene.with_options(options).unwrap_or_else(|error| panic!("{error}"));
+    let compiled = CompiledScene::build(Arc::new(scene), assets, None).unwrap_or_else(|errors| panic!("{errors}"));
+    let compiled = Arc::new(compiled);
+    let plan = Plan::new(&compiled, &PlanOptions { size: Some(size), ..PlanOptions::default() }).unwrap();
+    (compiled, Arc::new(plan))
+}
+
+/// The fingerprint of all that the pixels of a frame depend on.
+pub(crate) fn fingerprint(text: &str, size: [usize; 2], frame: i64) -> [u8; 32] {
+    let (_, plan) = planned(text, size, &SceneOptions::default());
+    plan.frame_fingerprint(frame, &FileAssets::new(scenes()))
+}
+
 /// The results of `look` for each of those frames.
 fn look_at<T>(
     text: &str,
@@ -31,13 +47,8 @@ fn look_at<T>(
     options: &SceneOptions,
     look: impl Fn(&Frame) -> T,
 ) -> Vec<T> {
-    let assets = Arc::new(FileAssets::new(scenes()));
-    let scene = bansho::parse_scene("scene", text).unwrap_or_else(|error| panic!("{error}"));
-    let scene = scene.with_options(options).unwrap_or_else(|error| panic!("{error}"));
-    let compiled = CompiledScene::build(Arc::new(scene), assets, None).unwrap_or_else(|errors| panic!("{errors}"));
-    let compiled = Arc::new(compiled);
-    let plan = Plan::new(&compiled, &PlanOptions { size: Some(size), ..PlanOptions::default() }).unwrap();
-    let mut shot = Shot::open(compiled, Arc::new(plan));
+    let (compiled, plan) = planned(text, size, options);
+    let mut shot = Shot::open(compiled, plan);
     frames.iter().map(|number| look(&bansho::draw(&mut shot, *number, &Unobserved).unwrap())).collect()
 }
 

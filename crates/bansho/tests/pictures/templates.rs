@@ -4,15 +4,21 @@ use bansho::{KINDS, SceneOptions, phenomena, scene::template};
 
 use crate::{
     SMALL,
-    looks::{Film, luminance},
+    looks::{Film, fingerprint, luminance},
 };
+
+const FRAME: i64 = 4;
 
 #[test]
 fn a_new_scene_of_any_kind_shows_something_well_exposed() {
     for kind in phenomena() {
-        let film = Film::of_text(&template::commented(kind, KINDS), SMALL, &[4], &SceneOptions::default());
-        let short = Film::of_text(&template::short(kind, KINDS), SMALL, &[4], &SceneOptions::default());
-        assert!(film.pixels().eq(short.pixels()), "{}: a short scene shows the same", kind.key);
+        let [commented, short] = [template::commented, template::short].map(|template| template(kind, KINDS));
+        let film = Film::of_text(&commented, SMALL, &[FRAME], &SceneOptions::default());
+        // Where the fingerprints are the same so are the pixels, which need not be drawn again.
+        if fingerprint(&commented, SMALL, FRAME) != fingerprint(&short, SMALL, FRAME) {
+            let short = Film::of_text(&short, SMALL, &[FRAME], &SceneOptions::default());
+            assert!(film.pixels().eq(short.pixels()), "{}: a short scene shows the same", kind.key);
+        }
         let share = |of: &dyn Fn(f64) -> bool| {
             film.pixels().filter(|pixel| of(luminance(**pixel))).count() as f64 / film.len() as f64
         };

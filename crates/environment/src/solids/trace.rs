@@ -127,12 +127,7 @@ impl PreparedSolids {
 /// The rectangle of the picture that the obstacles may cover while the shutter is open.
 pub(super) fn picture_bounds(solids: &Solids, view: &View) -> Rect {
     let (poses, _) = poses(solids, view);
-    hull(&bounds(&poses, view))
-}
-
-/// The smallest rectangle that contains others.
-fn hull(rects: &[Rect]) -> Rect {
-    rects.iter().fold(Rect::default(), |all, rect| all.union(rect))
+    Rect::hull(&bounds(&poses, view))
 }
 
 impl TracedPixels {
@@ -145,7 +140,7 @@ impl TracedPixels {
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         let rects = bounds(poses, view);
-        let rect = hull(&rects);
+        let rect = Rect::hull(&rects);
         let moving: Vec<Rect> = rects.iter().zip(moves).filter(|(_, moves)| **moves).map(|(rect, _)| *rect).collect();
         let shading = Shading::new(surroundings);
         let tracer = Tracer { poses, shading: &shading, rects: &rects, moving: &moving };
@@ -160,7 +155,7 @@ impl TracedPixels {
             }
             Ok(())
         })?;
-        Ok(Self { rect, moving_rect: hull(&moving), surfaces: opaque_surfaces(rect, &pixels), pixels })
+        Ok(Self { rect, moving_rect: Rect::hull(&moving), surfaces: opaque_surfaces(rect, &pixels), pixels })
     }
 }
 
@@ -191,7 +186,7 @@ impl<'a> UntracedSolids<'a> {
     pub(super) fn new(solids: &'a Solids, view: &View, surroundings: &'a Surroundings<'a>) -> Self {
         let pose = Pose::new(solids, view, view.shutter.middle());
         let rects = bounds(std::slice::from_ref(&pose), view);
-        let rect = hull(&rects);
+        let rect = Rect::hull(&rects);
         Self { pose, shading: Shading::new(surroundings), rects, rect }
     }
 

@@ -92,7 +92,7 @@ impl Composition<'_> {
         let covered = &mut moments[..count];
         self.draw_moments(level, rect, &members, OpaqueSurfacesAre::Drawn(&hiding), pass, strips, covered);
         let edges: Vec<Vec<Rect>> = hiding.iter().map(|hiding| hiding.edges(rect)).collect();
-        let edge_hull = hull(edges.iter().flatten());
+        let edge_hull = Rect::hull(edges.iter().flatten());
         if !edge_hull.is_empty() {
             let uncovered = &mut uncovered[..count];
             self.draw_moments(level, edge_hull, &members, OpaqueSurfacesAre::LeftOut(&edges), pass, strips, uncovered);
@@ -192,14 +192,9 @@ impl<'a> OpaqueSurfacesAre<'a> {
         match self {
             Self::Drawn(_) => vec![rect],
             Self::LeftOut(edges) if edges.len() <= pieces => edges[piece * edges.len() / pieces].clone(),
-            Self::LeftOut(edges) => vec![hull(edges[moments_of(piece, pieces, edges.len())].iter().flatten())],
+            Self::LeftOut(edges) => vec![Rect::hull(edges[moments_of(piece, pieces, edges.len())].iter().flatten())],
         }
     }
-}
-
-/// The smallest rectangle that contains others.
-fn hull<'a>(rects: impl Iterator<Item = &'a Rect>) -> Rect {
-    rects.fold(Rect::default(), |all, rect| all.union(rect))
 }
 
 #[cfg(test)]

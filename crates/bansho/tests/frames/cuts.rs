@@ -1,8 +1,5 @@
 //! Cuts: step keys are no motion. A frame shows one side of each, to the bit, whatever is drawn.
 
-#[path = "support/planned.rs"]
-mod planned;
-
 use std::sync::Arc;
 
 use bansho::KINDS;
@@ -12,7 +9,8 @@ use bansho_base::{
 };
 use bansho_render::PlanOptions;
 use bansho_scene::Scene;
-use planned::Planned;
+
+use crate::support::Planned;
 
 /// Everything that looks at the camera at several times: sheets with sparks, gas, rain, lamps, obstacles, wet ground, stars.
 const THINGS: &str = "\

@@ -3,15 +3,12 @@
 //! of the test: `cargo test -- --nocapture` prints what was measured. A test asserts a number by `assert_measured!("figure 2.14: quantity", ...)`, under the
 //! name of its row, and the row states that number.
 
-#[path = "support/sources.rs"]
-mod sources;
-
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
-use sources::{cells, exists, has_words, read, rust_files};
+use crate::sources::{cells, exists, has_words, read, rust_files};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 

@@ -1,8 +1,5 @@
 //! What is nearer hides what is farther, whatever the order of the scene's tables.
 
-#[path = "support/planned.rs"]
-mod planned;
-
 use std::sync::Arc;
 
 use bansho::KINDS;
@@ -12,7 +9,8 @@ use bansho_base::{
 };
 use bansho_render::PlanOptions;
 use bansho_scene::Scene;
-use planned::Planned;
+
+use crate::support::Planned;
 
 const HEADER: &str = "\
 bansho = 2

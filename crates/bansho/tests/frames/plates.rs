@@ -1,8 +1,5 @@
 //! Plates in pictures: what Bansho wrote comes back, alpha stays the picture's, depth of another size hides what it covers.
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod support;
-
 use std::{path::Path, sync::Arc};
 
 use bansho::{
@@ -21,7 +18,8 @@ use bansho_base::{
     image::Image,
 };
 use bansho_render::{display::display, remarks};
-use support::{draw, plan_with};
+
+use crate::support::{self, draw, plan_with};
 
 const EMPTY: &str = "bansho = 2\n[picture]\nsize = [24, 16]\nframes = 1\n";
 

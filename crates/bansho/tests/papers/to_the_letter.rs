@@ -1,8 +1,5 @@
 //! Scenes that follow a paper to the letter: what the pages of the book say of their keys, what `bansho check --paper` tells, and what the scenes state.
 
-#[path = "support/sources.rs"]
-mod sources;
-
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -16,7 +13,8 @@ use bansho::{
     },
     scene::parse_values,
 };
-use sources::{cells, read};
+
+use crate::sources::{cells, read};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 

@@ -1,11 +1,9 @@
 //! Sky, ground and lamps.
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod support;
-
 use bansho_base::image::Rect;
 use bansho_render::PlanOptions;
-use support::*;
+
+use crate::support::*;
 
 /// A camera 1 m above the ground that looks level at a lamp 4 m away, 1 m above the ground too.
 const LAKE: &str = "bansho = 2\n[picture]\nsize = [120, 90]\nexposure_ev100 = 0\n[camera]\nposition = [0, 1, 0]\ntarget = [0, 1, -1]\n\

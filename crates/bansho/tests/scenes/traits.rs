@@ -1,8 +1,5 @@
 //! Tests of the traits by two phenomena whose pictures are known in closed form.
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod support;
-
 use std::sync::{
     Arc,
     atomic::{AtomicUsize, Ordering},
@@ -20,7 +17,7 @@ use bansho_render::{
     display::{BitDepth, display},
 };
 
-use support::*;
+use crate::support::{self, *};
 
 const MIDDLE: (usize, usize) = (60, 45);
 

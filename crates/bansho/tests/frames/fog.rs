@@ -1,12 +1,10 @@
 //! `[fog]`: it dims and lights flames, grounds, obstacles and plates.
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod support;
-
 use std::sync::Arc;
 
 use bansho_render::PlanOptions;
-use support::*;
+
+use crate::support::*;
 
 /// A disc of 100 cd/m^2 in the middle of the picture, 10 m before the camera.
 fn disc(more: &str) -> String {

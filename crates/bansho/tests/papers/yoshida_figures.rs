@@ -1,6 +1,5 @@
 //! The pictures of Yoshida, Dobashi and Yamamoto, to the letter and by Bansho's own method: `scenes/papers/yoshida_dobashi_yamamoto`.
 //! `docs/src/papers/yoshida_dobashi_yamamoto.md` states the numbers.
-#![cfg(feature = "files")]
 
 use std::{path::PathBuf, sync::Arc};
 

@@ -1,6 +1,5 @@
 //! Motion in the open shutter: of everything that is drawn, one long exposure is the mean of twenty short ones, whether the camera moves, the thing, or
 //! both.
-#![cfg(all(feature = "fire", feature = "rain", feature = "aurora"))]
 
 use std::sync::Arc;
 

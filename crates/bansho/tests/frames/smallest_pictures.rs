@@ -1,7 +1,6 @@
 //! Pictures of a single row, column or pixel, and the longest ones: every scene and every phenomenon draws them, with finite pixels.
 //!
 //! `BANSHO_LARGEST_PICTURES=1`, as in `.ci/long`, also draws pictures of many rows of the greatest length.
-#![cfg(all(feature = "files", feature = "fire", feature = "rain", feature = "aurora"))]
 
 use std::{
     path::{Path, PathBuf},

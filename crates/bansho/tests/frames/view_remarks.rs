@@ -1,15 +1,13 @@
 //! Remarks on what the camera hardly shows.
 
-#[path = "support/planned.rs"]
-mod planned;
-
 use std::sync::Arc;
 
 use bansho::KINDS;
 use bansho_base::{host::assets::MemoryAssets, phenomenon::Remark};
 use bansho_render::PlanOptions;
 use bansho_scene::Scene;
-use planned::Planned;
+
+use crate::support::Planned;
 
 fn remarks(camera: &str, table: &str) -> Vec<(String, Remark)> {
     let text =

@@ -1,8 +1,5 @@
 //! Seamless loops of phenomena in closed form and of stepped phenomena.
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod support;
-
 use std::sync::Arc;
 
 use bansho::KINDS;
@@ -14,7 +11,7 @@ use bansho_base::{
 use bansho_render::PlanOptions;
 use bansho_scene::{Scene, SceneOptions};
 
-use support::*;
+use crate::support::{self, *};
 
 /// A shaken lamp that travels during a loop of one second, 24 frames, all of which are in the crossfade.
 const TRAVELER: &str =

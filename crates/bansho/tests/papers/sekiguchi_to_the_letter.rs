@@ -1,8 +1,5 @@
 //! The literal scenes of the thesis (`scenes/papers/sekiguchi`): their shapes, gaps, maps and errors.
 
-#[path = "support/planned.rs"]
-mod planned;
-
 use std::{fs, path::Path, sync::Arc};
 
 use bansho::KINDS;
@@ -20,7 +17,8 @@ use bansho_base::{
 };
 use bansho_render::{PlanOptions, Shot};
 use bansho_scene::Scene;
-use planned::Planned;
+
+use crate::planned::Planned;
 
 /// The text of a literal scene.
 fn text(name: &str) -> String {

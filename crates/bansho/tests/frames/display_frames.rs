@@ -1,8 +1,4 @@
 //! A frame that is drawn as display pixels, strip by strip, has the bytes of a frame whose light was converted as a whole.
-#![cfg(all(feature = "fire", feature = "rain", feature = "aurora"))]
-
-#[path = "support/planned.rs"]
-mod planned;
 
 use std::sync::Arc;
 
@@ -13,7 +9,8 @@ use bansho_base::{
     image::Rect,
 };
 use bansho_scene::Scene;
-use planned::Planned;
+
+use crate::support::Planned;
 
 /// Neither side is a multiple of the rows of a strip or of the lanes of a vector.
 const SIZE: [usize; 2] = [101, 67];

@@ -1,5 +1,4 @@
 //! The figures of Inagaki et al. by the paper's own gas: `scenes/papers/inagaki`. `docs/src/papers/inagaki.md` states the numbers.
-#![cfg(feature = "files")]
 
 use std::{path::PathBuf, sync::Arc};
 

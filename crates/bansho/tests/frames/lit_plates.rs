@@ -1,8 +1,5 @@
 //! Fires and lamps on what a plate shows: Lambert's law, normals from the depth and from a file, shadows of the depth, and what must not change.
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod support;
-
 use std::{f64::consts::PI, sync::Arc};
 
 use bansho::PlanOptions;
@@ -13,7 +10,8 @@ use bansho_base::{
     image::{Image, Rect},
     math::DVec3,
 };
-use support::{CAMERA, Planned, channel, draw, luminance, plan_with};
+
+use crate::support::{self, CAMERA, Planned, channel, draw, luminance, plan_with};
 
 const SIZE: [usize; 2] = [120, 90];
 /// Focal length of [`CAMERA`], pixels.

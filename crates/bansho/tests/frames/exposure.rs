@@ -1,8 +1,5 @@
 //! The exposure of shots that state none, and the light of a plate on rain.
 
-#[path = "support/planned.rs"]
-mod planned;
-
 use std::sync::Arc;
 
 use bansho::KINDS;
@@ -20,7 +17,8 @@ use bansho_render::{
     display::{BitDepth, display},
 };
 use bansho_scene::Scene;
-use planned::Planned;
+
+use crate::support::Planned;
 
 const SIZE: [usize; 2] = [160, 90];
 

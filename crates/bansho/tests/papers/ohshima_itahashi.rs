@@ -2,7 +2,6 @@
 //! and judged by measurements.
 //!
 //! The formulas are written down from the paper, and share nothing with the library but the curves that a scene states: V, H, C, R, G, B, A, D and F are free.
-#![cfg(feature = "files")]
 #![allow(clippy::disallowed_methods, reason = "an independent evaluation calls the standard library")]
 
 use std::{

@@ -1,8 +1,5 @@
 //! Auroral shapes in scene files: the five scenes of the thesis move as it describes, and errors are reported at their sheet and point.
 
-#[path = "support/planned.rs"]
-mod planned;
-
 use std::sync::Arc;
 
 use bansho::KINDS;
@@ -14,13 +11,14 @@ use bansho_base::{
 };
 use bansho_render::PlanOptions;
 use bansho_scene::Scene;
-use planned::Planned;
 
 use bansho_aurora::{
     AuroraParameters,
     shapes::{FRAME_S, NearestSegmentGrid, Sequence, Shape},
     simulate::AuroraSimulation,
 };
+
+use crate::support::Planned;
 
 fn assets() -> MemoryAssets {
     let stroke =
@@ -49,11 +47,11 @@ fn fault(text: &str) -> String {
 }
 
 const SCENES: [&str; 5] = [
-    include_str!("../../../scenes/sekiguchi_1.toml"),
-    include_str!("../../../scenes/sekiguchi_2.toml"),
-    include_str!("../../../scenes/sekiguchi_3.toml"),
-    include_str!("../../../scenes/sekiguchi_4.toml"),
-    include_str!("../../../scenes/sekiguchi_5.toml"),
+    include_str!("../../../../scenes/sekiguchi_1.toml"),
+    include_str!("../../../../scenes/sekiguchi_2.toml"),
+    include_str!("../../../../scenes/sekiguchi_3.toml"),
+    include_str!("../../../../scenes/sekiguchi_4.toml"),
+    include_str!("../../../../scenes/sekiguchi_5.toml"),
 ];
 
 fn sequence(scene: usize) -> Sequence {

@@ -1,8 +1,5 @@
 //! Scene files: errors have positions and state what is allowed.
 
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod support;
-
 use bansho_base::{
     host::assets::MemoryAssets,
     math::random::{Key, Purpose, uniform},
@@ -12,7 +9,7 @@ use bansho_base::{
 use bansho_render::PlanOptions;
 use bansho_scene::{schema, template};
 
-use support::*;
+use crate::support::*;
 
 /// The one problem of a scene, as a person reads it.
 fn fault(text: &str) -> String {

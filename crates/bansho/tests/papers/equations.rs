@@ -3,15 +3,12 @@
 //! A table has the columns `equation`, `what it says` and `function`; further columns are not read. The first cell of a row holds
 //! equation numbers, as in `(2.4), (2.5)` or `(14) to (16)`, or the name of something without a number, as in `section 5.2`.
 
-#[path = "support/sources.rs"]
-mod sources;
-
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
-use sources::{cells, crate_source, exists, read};
+use crate::sources::{cells, crate_source, exists, read};
 
 const BOOK: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/methods");
 

@@ -20,7 +20,7 @@ fn the_books_page_on_the_scene_file_is_up_to_date() {
     }
     let written = std::fs::read_to_string(PAGE).unwrap();
     let differs = written.lines().zip(page.lines()).find(|(written, now)| written != now);
-    assert_eq!(differs, None, "run BANSHO_BLESS=1 cargo test -p bansho --test scene_reference");
+    assert_eq!(differs, None, "run BANSHO_BLESS=1 cargo test -p bansho --test scenes scene_reference");
     assert_eq!(written.len(), page.len());
 }
 
@@ -81,7 +81,7 @@ fn the_guide_lists_every_aov() {
 fn page() -> String {
     let mut page = format!(
         "# The scene file\n\n\
-         <!-- Written by crates/bansho/tests/scene_reference.rs from the descriptors; edit those instead. -->\n\n\
+         <!-- Written by crates/bansho/tests/scenes/scene_reference.rs from the descriptors; edit those instead. -->\n\n\
          A scene begins with its format, `bansho = {FORMAT}`. Everything else may be left out and then has the default given \
          here. How values, keys and curves are written is described in [the guide](../guide/scene-file.md). Last in each table are the keys \
          that are there only so that [a paper](../papers/sekiguchi.md) can be followed to the letter.\n"

@@ -1,8 +1,5 @@
 //! The glare of the camera in pictures: it keeps the light, alpha and depth, leaves plates as they are, and is a layer of its own.
 
-#[path = "support/planned.rs"]
-mod planned;
-
 use std::sync::Arc;
 
 use bansho::{GlareUse, KINDS, PlanOptions};
@@ -15,7 +12,8 @@ use bansho_base::{
     image::Image,
 };
 use bansho_scene::Scene;
-use planned::Planned;
+
+use crate::support::Planned;
 
 const SIZE: [usize; 2] = [120, 90];
 const FLAME: &str = "[[flame_sheet]]\nwidth = 0.5\nheight = 0.7\nposition = [0, 0.55, 0]\n\

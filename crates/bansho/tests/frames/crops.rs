@@ -1,8 +1,5 @@
 //! A crop has the same pixels as the whole picture: light, depth, layers and AOVs, to the bit.
 
-#[path = "support/planned.rs"]
-mod planned;
-
 use std::sync::Arc;
 
 use bansho::KINDS;
@@ -13,7 +10,8 @@ use bansho_base::{
 };
 use bansho_render::PlanOptions;
 use bansho_scene::Scene;
-use planned::Planned;
+
+use crate::support::Planned;
 
 const SIZE: [usize; 2] = [101, 67];
 /// Crops that begin and end at odd pixels, so that their strips and vectors are never aligned with those of the whole picture.
