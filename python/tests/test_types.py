@@ -23,6 +23,17 @@ bansho.fog(photographs[0], np.full((90, 160), 9.0), camera=shot.camera(0))
 width, height = shot.size
 """
 
+# Checked where PyTorch is installed.
+LOADED = """
+import bansho
+import numpy as np
+from torch.utils.data import DataLoader
+
+photographs = np.zeros((2, 90, 160, 3), np.uint8)
+DataLoader(bansho.datasets.RainPairs(photographs, rate_mm_per_h=5), batch_size=2)
+DataLoader(bansho.datasets.AllSkyAurora(count=2, size=64), batch_size=2)
+"""
+
 WRONG = """
 import bansho
 
@@ -60,6 +71,12 @@ def test_the_code_of_the_pages_has_no_wrong_types(checked, tmp_path):
         (tmp_path / files[-1]).write_text("\n".join(blocks), encoding="utf-8")
     (tmp_path / "right.py").write_text(RIGHT, encoding="utf-8")
     assert checked(tmp_path, *files, "right.py") == []
+
+
+def test_data_sets_are_those_of_pytorch(checked, tmp_path):
+    pytest.importorskip("torch")
+    (tmp_path / "loaded.py").write_text(LOADED, encoding="utf-8")
+    assert checked(tmp_path, "loaded.py") == []
 
 
 def test_wrong_calls_are_found(checked, tmp_path):

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,17 @@ from numpy.typing import NDArray
 from . import _checks, _workers, transforms, weather
 from .scene import Scene
 from .shot import open as open_shot
+
+if TYPE_CHECKING:
+    from torch.utils.data import Dataset
+else:
+
+    class Dataset:
+        """In place of PyTorch's class, which type checkers want: a `DataLoader` asks for `__len__` and `__getitem__` alone, so PyTorch is not needed."""
+
+        def __class_getitem__(cls, item):
+            return cls
+
 
 __all__ = ["AllSkyAurora", "RainPairs", "iterate"]
 
@@ -38,7 +49,7 @@ def read_depth(path: str | os.PathLike[str]) -> NDArray[Any]:
         return np.asarray(picture)
 
 
-class RainPairs:
+class RainPairs(Dataset[Any]):
     """Pairs of a clean and a rainy picture: a map-style data set, which PyTorch's `DataLoader` takes.
 
     >>> pairs = bansho.datasets.RainPairs(images, depths, rate_mm_per_h=(5, 50), per_image=4, seed=7)
@@ -48,8 +59,8 @@ class RainPairs:
 
     def __init__(
         self,
-        images: Sequence[Any],
-        depths: Sequence[Any] | None = None,
+        images: Sequence[Any] | NDArray[Any],
+        depths: Sequence[Any] | NDArray[Any] | None = None,
         *,
         per_image: int = 1,
         seed: int = 0,
@@ -107,7 +118,7 @@ def _positive(value: Any, name: str) -> tuple[float, float]:
     return ends
 
 
-class AllSkyAurora:
+class AllSkyAurora(Dataset[dict[str, Any]]):
     """All-sky pictures of auroras with the brightness of their lines in kilorayleighs: a map-style data set.
 
     An item has `image` (size, size, 4; `uint8`), `kilorayleigh_557`, `kilorayleigh_630`, `kilorayleigh_427` (size, size), and the parameters of the aurora.
