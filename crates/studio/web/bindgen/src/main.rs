@@ -9,6 +9,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<PathBuf> = env::args_os().skip(1).map(PathBuf::from).collect();
     let [wasm, out] = arguments.as_slice() else { return Err("usage: bansho-studio-bindgen WASM OUT".into()) };
     let mut bindgen = Bindgen::new();
-    bindgen.input_path(wasm).out_name("bansho_studio").typescript(false).web(true)?;
+    // Without a path the JavaScript loads the module that lies beside it.
+    bindgen.input_path(wasm).out_name("bansho_studio").typescript(false).omit_default_module_path(false).web(true)?;
     Ok(bindgen.generate(out)?)
 }
