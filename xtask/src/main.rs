@@ -19,7 +19,7 @@ look SCENE [FRAME]    render a frame (0 by default) of a scene, a file or a name
 fmt                   format all code
 docs                  the documentation of all crates, without a warning
 book                  the book with its figures, and its links
-ci                    everything that CI checks, in about an hour on two cores
+ci                    everything that CI checks, in about 80 minutes on two slow cores
 long                  the same with full counts: hours";
 
 /// Options of criterion by which the ratios of CI are measured.

@@ -3,6 +3,11 @@
 use std::sync::Arc;
 
 use bansho::KINDS;
+use bansho_aurora::{
+    AuroraParameters,
+    shapes::{FRAME_S, NearestSegmentGrid, Sequence, Shape},
+    simulate::AuroraSimulation,
+};
 use bansho_base::{
     geometry::strokes::{Drawing, Stroke},
     host::{assets::MemoryAssets, observer::Unobserved},
@@ -11,12 +16,6 @@ use bansho_base::{
 };
 use bansho_render::PlanOptions;
 use bansho_scene::Scene;
-
-use bansho_aurora::{
-    AuroraParameters,
-    shapes::{FRAME_S, NearestSegmentGrid, Sequence, Shape},
-    simulate::AuroraSimulation,
-};
 
 use crate::support::Planned;
 
